@@ -1,0 +1,8 @@
+//! Kalman filter (Joseph form), square root, steady state, the filter.json document, the run record (floor 3).
+
+pub mod document;
+pub mod kalman;
+pub mod steady_state;
+
+pub use document::{AxisDesign, FilterDesign, FilterError};
+pub use kalman::Kalman;

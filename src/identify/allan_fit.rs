@@ -1,0 +1,1 @@
+//! Weighted fit of the whole Allan curve.

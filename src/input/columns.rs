@@ -1,0 +1,1 @@
+//! Column names and header units to axes.

@@ -1,0 +1,7 @@
+//! Linear algebra, matrix equations, distributions, random streams and ordered sums (floor 0).
+
+pub mod distribution;
+pub mod linalg;
+pub mod random;
+pub mod reduce;
+pub mod riccati;

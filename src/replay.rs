@@ -1,0 +1,1 @@
+//! A log through a design to a verdict (floor 4).

@@ -1,0 +1,1 @@
+//! SVG figures and one-page HTML reports (floor 6).

@@ -1,0 +1,1 @@
+//! Autocovariance, autocorrelation and Ljung-Box ingredients (FFT for long series).

@@ -1,0 +1,1 @@
+//! Periodogram and Welch spectrum, two-sided PSD in unit²/Hz.

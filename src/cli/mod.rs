@@ -1,1 +1,79 @@
 //! One file per command; the only place that prints and exits (floor 7).
+//!
+//! Exit status: 0 done and consistent; 1 done, but a stated check failed; 2 could not do it, with one clear line.
+
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "the command line is the one place that prints")]
+
+pub mod allan;
+pub mod identify;
+pub mod log_flags;
+pub mod output;
+pub mod replay;
+pub mod schema;
+pub mod simulate;
+pub mod tune;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// How a command ended when it could do its work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Status {
+    /// Exit 0.
+    Done,
+    /// Exit 1: done, but a stated check failed.
+    CheckFailed,
+}
+
+/// Kalman-filter design workbench for inertial sensors: identify, tune, replay, prove.
+#[derive(Debug, Parser)]
+#[command(
+    name = "kfdesign",
+    version,
+    about,
+    after_help = "Exit status: 0 done and consistent; 1 done, but a stated check failed; 2 could not do it.\nUnits are never guessed: the log's header or --unit says them."
+)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Allan(allan::Args),
+    Identify(identify::Args),
+    Simulate(simulate::Args),
+    Tune(tune::Args),
+    Replay(replay::Args),
+    Schema(schema::Args),
+}
+
+/// Parse the process arguments, run, map to the exit status.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // clap prints usage errors to stderr, help and version to stdout; a closed pipe is no error
+            let _ = error.print();
+            return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
+        }
+    };
+    let result = match cli.command {
+        Command::Allan(args) => allan::run(&args),
+        Command::Identify(args) => identify::run(&args),
+        Command::Simulate(args) => simulate::run(&args),
+        Command::Tune(args) => tune::run(&args),
+        Command::Replay(args) => replay::run(&args),
+        Command::Schema(args) => schema::run(&args),
+    };
+    match result {
+        Ok(Status::Done) => ExitCode::SUCCESS,
+        Ok(Status::CheckFailed) => ExitCode::from(1),
+        Err(error) if output::is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("kfdesign: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}

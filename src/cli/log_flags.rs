@@ -1,0 +1,91 @@
+//! The flags every command that takes LOG has, and the log check printed in one form.
+
+use clap::{Args, ValueEnum};
+
+use crate::input::{InputKind, LogOptions};
+use crate::signal::LogCheck;
+use crate::units::{Quantity, Unit};
+
+/// How to read LOG.
+#[derive(Clone, Debug, Default, Args)]
+#[command(next_help_heading = "Reading the log")]
+pub struct LogFlags {
+    /// Columns to use: names or 1-based numbers, comma separated [default: found by name]
+    #[arg(long, value_delimiter = ',', value_name = "COLUMNS")]
+    pub columns: Option<Vec<String>>,
+    /// Time column: name or 1-based number; `none` ignores time columns
+    #[arg(long, value_name = "COLUMN")]
+    pub time: Option<String>,
+    /// Unit of the columns if the header does not say it: deg/s, rad/s, mdps, m/s^2, g, "1/131 deg/s" …
+    #[arg(long, value_name = "UNIT")]
+    pub unit: Option<String>,
+    /// Sample rate in Hz if there is no time column; with one, it replaces the stamps
+    #[arg(long, value_name = "HZ")]
+    pub rate: Option<f64>,
+    /// Skip the first seconds
+    #[arg(long, value_name = "SECONDS")]
+    pub start: Option<f64>,
+    /// Stop at this time, seconds from the start of the log
+    #[arg(long, value_name = "SECONDS")]
+    pub end: Option<f64>,
+    /// What the values are
+    #[arg(long, value_enum, default_value_t = InputArg::Rate)]
+    pub input: InputArg,
+    /// Which sensor, if the log holds both
+    #[arg(long, value_enum)]
+    pub sensor: Option<SensorArg>,
+}
+
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub enum InputArg {
+    /// Angular rate or specific force
+    #[default]
+    Rate,
+    /// Increments over one sample (delta angle, delta velocity)
+    Increments,
+    /// Integrated angle or velocity
+    Angle,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum SensorArg {
+    Gyro,
+    Accel,
+}
+
+impl LogFlags {
+    /// What was typed, checked.
+    pub fn options(&self) -> anyhow::Result<LogOptions> {
+        Ok(LogOptions {
+            columns: self.columns.clone(),
+            time: self.time.clone(),
+            unit: self.unit.as_deref().map(Unit::parse).transpose().map_err(|e| anyhow::anyhow!("--unit: {e}"))?,
+            rate_hz: self.rate,
+            start_s: self.start,
+            end_s: self.end,
+            kind: match self.input {
+                InputArg::Rate => InputKind::Rate,
+                InputArg::Increments => InputKind::Increments,
+                InputArg::Angle => InputKind::Angle,
+            },
+            quantity: self.sensor.map(|s| match s {
+                SensorArg::Gyro => Quantity::AngularRate,
+                SensorArg::Accel => Quantity::SpecificForce,
+            }),
+        })
+    }
+}
+
+/// The log check on stderr, one line a finding.
+pub fn print_check(name: &str, check: &LogCheck) {
+    eprintln!(
+        "{name}: {} samples at {:.6} Hz, {:.1} s{}",
+        check.samples,
+        check.sample_rate_hz,
+        check.span_s,
+        if check.findings.is_empty() { ", nothing unusual" } else { "" }
+    );
+    for finding in &check.findings {
+        eprintln!("  {}: {}", if finding.serious { "warning" } else { "note" }, finding.message);
+    }
+}

@@ -1,0 +1,204 @@
+//! Unit strings to SI and back, with half-integer powers and a dimension check (floor 0).
+//!
+//! Inside kfdesign every number is SI (rad, m, s, K). Conversion happens once, at the edges, by a [`Unit`].
+//! `parse` holds the grammar, `symbol` the table of names, `dimension` the words for what a dimension is.
+
+mod dimension;
+mod parse;
+mod symbol;
+
+use std::fmt;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use symbol::Symbol;
+
+/// Exponents of the base dimensions **times two**, so that `1/sqrt(Hz)` is exact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub struct Dimension {
+    pub angle: i8,
+    pub length: i8,
+    pub time: i8,
+    pub temperature: i8,
+}
+
+/// A parsed unit: the text as the user wrote it, its factor to SI and its dimension.
+///
+/// A unit is a factor only. Temperatures in degC and K therefore agree as differences, not as readings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unit {
+    text: String,
+    scale: f64,
+    dimension: Dimension,
+    factors: Vec<Factor>,
+}
+
+/// A symbol with its exponent times two.
+#[derive(Clone, Debug, PartialEq)]
+struct Factor {
+    symbol: Symbol,
+    half_power: i8,
+}
+
+/// What a sensor measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Quantity {
+    AngularRate,
+    SpecificForce,
+}
+
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum UnitError {
+    /// One clear sentence: what was found, where, what is accepted.
+    #[error("unknown unit '{found}': {hint}")]
+    Unknown { found: String, hint: String },
+    #[error("unit '{found}' is {found_dimension}, expected {expected} (for example {example})")]
+    WrongDimension { found: String, found_dimension: String, expected: String, example: String },
+}
+
+impl Quantity {
+    pub const fn dimension(self) -> Dimension {
+        match self {
+            Quantity::AngularRate => Dimension::new(2, 0, -2),
+            Quantity::SpecificForce => Dimension::new(0, 2, -4),
+        }
+    }
+    /// "rad/s" or "m/s^2".
+    pub const fn si_unit(self) -> &'static str {
+        match self {
+            Quantity::AngularRate => "rad/s",
+            Quantity::SpecificForce => "m/s^2",
+        }
+    }
+}
+
+impl Unit {
+    /// Parses every spelling people print: `deg/sqrt(h)`, `deg/s/√Hz`, `°/s`, `mdps`, `ug/sqrt(Hz)`,
+    /// `[rad s^-1]`, `m/s²`, `1/131 deg/s` (a leading number or fraction scales) …
+    ///
+    /// `g` is standard gravity, 9.80665 m/s². What can be read in two ways (`deg/s·√Hz`, `G`, `d`) is refused with a hint.
+    pub fn parse(text: &str) -> Result<Unit, UnitError> {
+        parse::unit(text)
+    }
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+    /// SI value of 1 in this unit.
+    pub fn scale(&self) -> f64 {
+        self.scale
+    }
+    pub fn dimension(&self) -> Dimension {
+        self.dimension
+    }
+    pub fn to_si(&self, value: f64) -> f64 {
+        value * self.scale
+    }
+    pub fn from_si(&self, value: f64) -> f64 {
+        value / self.scale
+    }
+    /// `Ok` when the unit has this dimension; the error names both and gives an example.
+    pub fn require(&self, expected: Dimension) -> Result<(), UnitError> {
+        if self.dimension == expected {
+            return Ok(());
+        }
+        Err(UnitError::WrongDimension {
+            found: self.text.clone(),
+            found_dimension: dimension::found(self.dimension, expected),
+            expected: expected.name(),
+            example: expected.example(),
+        })
+    }
+    /// The unit times `time^(half_powers/2)` in the same spelling family: `deg/s` with +1 gives `deg/s/sqrt(Hz)`,
+    /// with −1 `deg/s/sqrt(s)`, with +2 the integral (`deg`), with −2 `deg/s^2`. Used to print parameters in the log's own unit.
+    ///
+    /// The time unit of the family is kept (`deg/h` with −1 gives `deg/h/sqrt(h)`). A leading number (the step of a
+    /// converter, `1/131 deg/s`) is dropped, also with 0: parameters are printed in the physical unit.
+    pub fn times_time(&self, half_powers: i8) -> Unit {
+        let mut factors = self.factors.clone();
+        let whole = half_powers / 2;
+        for _ in 0..whole.unsigned_abs() {
+            shift_time(&mut factors, whole > 0);
+        }
+        match half_powers % 2 {
+            1 => factors.push(Factor { symbol: Symbol::hertz(), half_power: -1 }),
+            -1 => {
+                let symbol =
+                    factors.iter().find(|f| f.is_divisor_time()).map_or_else(Symbol::second, |f| f.symbol.clone());
+                factors.push(Factor { symbol, half_power: -1 });
+            }
+            _ => {}
+        }
+        Unit::of_factors(factors)
+    }
+    /// The quantity this unit belongs to, if it is a rate or a specific force.
+    pub fn quantity(&self) -> Option<Quantity> {
+        [Quantity::AngularRate, Quantity::SpecificForce].into_iter().find(|q| q.dimension() == self.dimension)
+    }
+
+    /// Factors written in the plain form (`deg/s/sqrt(Hz)`), with no leading number.
+    fn of_factors(factors: Vec<Factor>) -> Unit {
+        let dimension = factors.iter().fold(Dimension::NONE, |d, f| d.times(f.symbol.dimension, f.half_power));
+        let scale = factors.iter().map(Factor::scale).product();
+        Unit { text: plain_text(&factors), scale, dimension, factors }
+    }
+}
+
+impl Factor {
+    fn scale(&self) -> f64 {
+        let whole = self.symbol.scale.powi(i32::from(self.half_power / 2));
+        match self.half_power % 2 {
+            0 => whole,
+            1 => whole * self.symbol.scale.sqrt(),
+            _ => whole / self.symbol.scale.sqrt(),
+        }
+    }
+    /// A whole power of a second, minute or hour below the line.
+    fn is_divisor_time(&self) -> bool {
+        self.symbol.dimension == Dimension::TIME && self.half_power <= -2
+    }
+}
+
+/// Multiply (`up`) or divide the factors by their own time unit, once.
+fn shift_time(factors: &mut Vec<Factor>, up: bool) {
+    let step = if up { 2 } else { -2 };
+    if let Some(i) = factors.iter().position(Factor::is_divisor_time) {
+        factors[i].half_power = factors[i].half_power.saturating_add(step);
+        if factors[i].half_power == 0 {
+            factors.remove(i);
+        }
+    } else if let Some((i, integral)) =
+        factors.iter().enumerate().find_map(|(i, f)| Some((i, f.symbol.integral()?))).filter(|_| up)
+        && factors[i].half_power == 2
+    {
+        factors[i].symbol = integral;
+    } else {
+        factors.push(Factor { symbol: Symbol::second(), half_power: step });
+    }
+}
+
+fn plain_text(factors: &[Factor]) -> String {
+    let power = |f: &Factor| {
+        let half = f.half_power.unsigned_abs();
+        match half {
+            1 => format!("sqrt({})", f.symbol.name),
+            2 => f.symbol.name.clone(),
+            _ if half.is_multiple_of(2) => format!("{}^{}", f.symbol.name, half / 2),
+            _ => format!("{}^{}.5", f.symbol.name, half / 2),
+        }
+    };
+    let above: Vec<String> = factors.iter().filter(|f| f.half_power > 0).map(power).collect();
+    let mut text = if above.is_empty() { "1".to_string() } else { above.join("*") };
+    for factor in factors.iter().filter(|f| f.half_power < 0) {
+        text.push('/');
+        text.push_str(&power(factor));
+    }
+    text
+}
+
+impl fmt::Display for Unit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}

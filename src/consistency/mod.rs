@@ -1,5 +1,14 @@
 //! NEES, NIS, whiteness, the low-frequency innovation test, multiplicity and the verdict record (floor 3).
+//!
+//! Every test is two-sided: a covariance that is too large (a pessimistic filter) fails like one that is too small (an
+//! optimistic filter), and the sentence in [`Test::meaning`] says which of the two it is.
+//!
+//! The tests take *normalised* innovations y = ν/√S. For a filter whose model is true they are independent N(0, 1), so the
+//! null distribution of each statistic here is exact or has a stated approximation; see each function.
+//! NEES is correlated in time: use [`normalized::across_runs`] at one epoch, or [`normalized::over_time`] with its effective
+//! sample size, never χ² with one run's sample count.
 
+pub mod effect;
 pub mod low_frequency;
 pub mod multiplicity;
 pub mod normalized;
@@ -7,6 +16,8 @@ pub mod whiteness;
 
 use schemars::JsonSchema;
 use serde::Serialize;
+
+pub use effect::Effect;
 
 /// The outcome of a command that judges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
@@ -17,18 +28,60 @@ pub enum Verdict {
     Inconclusive,
 }
 
+impl Verdict {
+    /// The word used in documents and on the screen.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Verdict::Consistent => "consistent",
+            Verdict::Inconsistent => "inconsistent",
+            Verdict::Inconclusive => "inconclusive",
+        }
+    }
+}
+
 /// One test of one axis.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Test {
     pub axis: String,
-    /// "nis", "whiteness", "low_frequency", "nees", "innovation_mean" …
+    /// "nis", "whiteness", "ljung_box", "low_frequency", "cumulative_periodogram", "start", "nees", …
     pub name: String,
     pub statistic: f64,
+    /// The statistic lies in [lower, upper] with probability 1 − alpha when the design is true (each test alone).
     pub lower: f64,
     pub upper: f64,
+    /// Two-sided.
     pub p_value: f64,
+    /// Holm, over all tests and axes of the document.
     pub adjusted_p_value: f64,
     pub pass: bool,
     /// A sentence.
     pub meaning: String,
+    /// How large the deviation is, where it can be said; judged on measured logs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub effect: Option<Effect>,
+}
+
+impl Test {
+    /// A test not yet judged: `adjusted_p_value` is the p-value and `pass` is true until [`multiplicity::judge`] or
+    /// [`effect::judge`] has seen all tests of the document.
+    pub fn new(axis: &str, name: &str, statistic: f64, bounds: [f64; 2], p_value: f64, meaning: String) -> Test {
+        Test {
+            axis: axis.to_string(),
+            name: name.to_string(),
+            statistic,
+            lower: bounds[0],
+            upper: bounds[1],
+            p_value,
+            adjusted_p_value: p_value,
+            pass: true,
+            meaning,
+            effect: None,
+        }
+    }
+
+    #[must_use]
+    pub fn with_effect(mut self, effect: Effect) -> Test {
+        self.effect = Some(effect);
+        self
+    }
 }

@@ -1,10 +1,23 @@
-//! Predict and update on a [`LinearModel`](crate::model::LinearModel), Joseph form, no allocation per step.
+//! Predict and update on a [`LinearModel`], Joseph form, no allocation per step.
 //!
 //! Convention: x0, P0 belong to the first measurement (no prediction before it); then predict, update.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::model::LinearModel;
+
+/// Calls a kernel with its size known to the compiler for the sizes that occur most, so that the loops unroll.
+macro_rules! for_size {
+    ($n:expr, $kernel:ident($($argument:expr),*)) => {
+        match $n {
+            1 => $kernel(1, $($argument),*),
+            2 => $kernel(2, $($argument),*),
+            3 => $kernel(3, $($argument),*),
+            4 => $kernel(4, $($argument),*),
+            n => $kernel(n, $($argument),*),
+        }
+    };
+}
 
 /// One scalar-measurement update's results.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,35 +30,245 @@ pub struct Update {
     pub nis: f64,
     /// −½ (ln 2πS + ν²/S).
     pub log_likelihood: f64,
-    /// False when it was gated out (the state was not changed).
+    /// False when it was gated out or not a finite number (the state was not changed).
     pub accepted: bool,
 }
 
 /// State of a running filter.
+///
+/// `x` and `p` are x(k|k−1), P(k|k−1) after [`predict`](Kalman::predict) and x(k|k), P(k|k) after [`update`](Kalman::update).
 #[derive(Clone, Debug)]
 pub struct Kalman {
     pub x: DVector<f64>,
     pub p: DMatrix<f64>,
+    f: DMatrix<f64>,
+    /// Hᵀ, so that the row of one measurement is contiguous.
+    h_columns: DMatrix<f64>,
+    q: DMatrix<f64>,
+    r: Vec<f64>,
+    scratch: Scratch,
+}
+
+/// Memory of a step, taken once.
+#[derive(Clone, Debug)]
+struct Scratch {
+    vector: Vec<f64>,
+    matrix: Vec<f64>,
+    /// F^(2^k), its difference from I, and the process noise of 2^k steps, for gaps.
+    power: Vec<f64>,
+    difference: Vec<f64>,
+    noise: Vec<f64>,
 }
 
 impl Kalman {
     /// Starts at x0, P0.
+    ///
+    /// Measurements are taken one at a time, so R must be diagonal (its diagonal is used).
+    /// Panics when the model's matrices do not fit each other; [`FilterDesign`](super::FilterDesign) checks what it reads.
     pub fn new(model: &LinearModel) -> Kalman {
-        let _ = model;
-        todo!()
+        let n = model.x0.len();
+        let m = model.h.nrows();
+        assert_eq!(model.f.shape(), (n, n), "F");
+        assert_eq!(model.q.shape(), (n, n), "Q");
+        assert_eq!(model.p0.shape(), (n, n), "P0");
+        assert_eq!(model.h.ncols(), n, "H");
+        assert_eq!(model.r.shape(), (m, m), "R");
+        Kalman {
+            x: model.x0.clone(),
+            p: model.p0.clone(),
+            f: model.f.clone(),
+            h_columns: model.h.transpose(),
+            q: model.q.clone(),
+            r: model.r.diagonal().iter().copied().collect(),
+            scratch: Scratch {
+                vector: vec![0.0; n],
+                matrix: vec![0.0; n * n],
+                power: vec![0.0; n * n],
+                difference: vec![0.0; n * n],
+                noise: vec![0.0; n * n],
+            },
+        }
     }
+
     /// x ← F x, P ← F P Fᵀ + Q.
     pub fn predict(&mut self) {
-        todo!()
+        let Scratch { vector, matrix, .. } = &mut self.scratch;
+        let (f, q) = (self.f.as_slice(), self.q.as_slice());
+        let (x, p) = (self.x.as_mut_slice(), self.p.as_mut_slice());
+        for_size!(x.len(), predict_kernel(f, q, x, p, vector, matrix));
     }
+
     /// n predictions with no measurement between (a gap); cost grows with log n.
+    ///
+    /// F^(2^k) and the noise of 2^k steps, Q + F Q Fᵀ + …, are doubled and applied where n has a binary one.
+    /// Powers are kept as I + D, D ← 2D + D², so that poles close to one keep their distance from it.
     pub fn predict_many(&mut self, n: u64) {
-        let _ = n;
-        todo!()
+        let Scratch { vector, matrix, power, difference, noise } = &mut self.scratch;
+        let (x, p) = (self.x.as_mut_slice(), self.p.as_mut_slice());
+        let states = x.len();
+        power.copy_from_slice(self.f.as_slice());
+        noise.copy_from_slice(self.q.as_slice());
+        difference.copy_from_slice(power);
+        for i in 0..states {
+            difference[i * (states + 1)] -= 1.0;
+        }
+        let mut left = n;
+        while left > 0 {
+            if left & 1 == 1 {
+                predict_kernel(states, power, noise, x, p, vector, matrix);
+            }
+            left >>= 1;
+            if left > 0 {
+                double(states, power, difference, noise, matrix);
+            }
+        }
     }
+
     /// Update with measurement `index` (a row of H). `gate`: reject when |ν| > gate·√S.
+    ///
+    /// S = h P hᵀ + r, K = P hᵀ/S, x ← x + K ν, P ← (I − K h) P (I − K h)ᵀ + K r Kᵀ.
+    /// A measurement or variance that is not a finite number changes nothing and is reported as not accepted.
+    /// Source: Bucy and Joseph 1968 (the form that stays definite for any gain).
     pub fn update(&mut self, index: usize, z: f64, gate: Option<f64>) -> Update {
-        let _ = (index, z, gate);
-        todo!()
+        let n = self.x.len();
+        let measurement = Measurement {
+            h: &self.h_columns.as_slice()[index * n..(index + 1) * n],
+            r: self.r[index],
+            z,
+            gate: gate.unwrap_or(f64::INFINITY),
+        };
+        let Scratch { vector, matrix, .. } = &mut self.scratch;
+        let (x, p) = (self.x.as_mut_slice(), self.p.as_mut_slice());
+        for_size!(n, update_kernel(&measurement, x, p, vector, matrix))
+    }
+}
+
+/// A scalar measurement z = h x + v, v ~ N(0, r).
+struct Measurement<'a> {
+    h: &'a [f64],
+    r: f64,
+    z: f64,
+    gate: f64,
+}
+
+/// x ← F x, P ← F P Fᵀ + Q; F, Q, P by columns. Only one triangle of P is computed, so it stays exactly symmetric.
+#[inline(always)]
+fn predict_kernel(n: usize, f: &[f64], q: &[f64], x: &mut [f64], p: &mut [f64], v: &mut [f64], m: &mut [f64]) {
+    let (f, q, x, v) = (&f[..n * n], &q[..n * n], &mut x[..n], &mut v[..n]);
+    let (p, m) = (&mut p[..n * n], &mut m[..n * n]);
+    for i in 0..n {
+        let mut sum = 0.0;
+        for k in 0..n {
+            sum += f[i + n * k] * x[k];
+        }
+        v[i] = sum;
+    }
+    x.copy_from_slice(v);
+    for j in 0..n {
+        for i in 0..n {
+            let mut sum = 0.0;
+            for k in 0..n {
+                sum += f[i + n * k] * p[k + n * j];
+            }
+            m[i + n * j] = sum;
+        }
+    }
+    for j in 0..n {
+        for i in j..n {
+            let mut sum = q[i + n * j];
+            for k in 0..n {
+                sum += m[i + n * k] * f[j + n * k];
+            }
+            p[i + n * j] = sum;
+            p[j + n * i] = sum;
+        }
+    }
+}
+
+/// One scalar update; `v` and `m` are scratch of n and n² numbers.
+#[inline(always)]
+fn update_kernel(
+    n: usize,
+    measurement: &Measurement<'_>,
+    x: &mut [f64],
+    p: &mut [f64],
+    v: &mut [f64],
+    m: &mut [f64],
+) -> Update {
+    let &Measurement { h, r, z, gate } = measurement;
+    let (h, x, v) = (&h[..n], &mut x[..n], &mut v[..n]);
+    let (p, m) = (&mut p[..n * n], &mut m[..n * n]);
+    let (mut predicted, mut variance) = (0.0, r);
+    for i in 0..n {
+        let mut sum = 0.0;
+        for k in 0..n {
+            sum += p[i + n * k] * h[k];
+        }
+        v[i] = sum; // P hᵀ
+        predicted += h[i] * x[i];
+        variance += h[i] * sum;
+    }
+    let innovation = z - predicted;
+    let nis = innovation * innovation / variance;
+    let log_likelihood = -0.5 * ((std::f64::consts::TAU * variance).ln() + nis);
+    let accepted = log_likelihood.is_finite() && innovation.abs() <= gate * variance.sqrt();
+    if accepted {
+        for i in 0..n {
+            v[i] /= variance; // K
+            x[i] += v[i] * innovation;
+        }
+        joseph(n, v, h, r, p, m);
+    }
+    Update { innovation, variance, nis, log_likelihood, accepted }
+}
+
+/// P ← (I − K h) P (I − K h)ᵀ + K r Kᵀ with T = (I − K h) P formed first: n² work for a scalar measurement.
+#[inline(always)]
+fn joseph(n: usize, k: &[f64], h: &[f64], r: f64, p: &mut [f64], t: &mut [f64]) {
+    for j in 0..n {
+        let mut h_p = 0.0;
+        for i in 0..n {
+            h_p += h[i] * p[i + n * j];
+        }
+        for i in 0..n {
+            t[i + n * j] = p[i + n * j] - k[i] * h_p;
+        }
+    }
+    for i in 0..n {
+        let mut t_h = 0.0;
+        for j in 0..n {
+            t_h += t[i + n * j] * h[j];
+        }
+        for j in 0..=i {
+            let value = t[i + n * j] - t_h * k[j] + k[i] * r * k[j];
+            p[i + n * j] = value;
+            p[j + n * i] = value;
+        }
+    }
+}
+
+/// Q ← Q + F Q Fᵀ, then D ← 2D + D², F ← I + D.
+fn double(n: usize, f: &mut [f64], d: &mut [f64], q: &mut [f64], m: &mut [f64]) {
+    for j in 0..n {
+        for i in 0..n {
+            m[i + n * j] = (0..n).map(|k| f[i + n * k] * q[k + n * j]).sum();
+        }
+    }
+    for j in 0..n {
+        for i in j..n {
+            let value = q[i + n * j] + (0..n).map(|k| m[i + n * k] * f[j + n * k]).sum::<f64>();
+            q[i + n * j] = value;
+            q[j + n * i] = value;
+        }
+    }
+    for j in 0..n {
+        for i in 0..n {
+            m[i + n * j] = 2.0 * d[i + n * j] + (0..n).map(|k| d[i + n * k] * d[k + n * j]).sum::<f64>();
+        }
+    }
+    d.copy_from_slice(m);
+    f.copy_from_slice(m);
+    for i in 0..n {
+        f[i * (n + 1)] += 1.0;
     }
 }

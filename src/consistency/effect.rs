@@ -16,8 +16,8 @@ pub const AUTOCORRELATION_TOLERANCE: f64 = 0.1;
 /// Sum of squared autocorrelations that is tolerated: the share of the innovation variance that a better model could predict,
 /// to first order.
 pub const PREDICTABLE_TOLERANCE: f64 = 0.03;
-/// Low-frequency variance ratio that is tolerated, either way.
-pub const VARIANCE_RATIO_TOLERANCE: f64 = 1.5;
+/// Low-frequency variance ratio that is tolerated, either way: about 14 % in the size of the drift.
+pub const VARIANCE_RATIO_TOLERANCE: f64 = 1.3;
 /// Largest distance of the cumulative periodogram from a straight line that is tolerated.
 pub const PERIODOGRAM_TOLERANCE: f64 = 0.1;
 

@@ -66,12 +66,17 @@ pub fn judge(tests: &mut [Test], alpha: f64, enough: bool) -> Verdict {
         let beyond = test.effect.as_ref().is_none_or(Effect::is_beyond);
         test.pass = !(significant && beyond);
         failed |= !test.pass;
-        undecided |= test.adjusted_p_value.is_nan();
-        undecided |= significant && test.pass && !test.effect.as_ref().is_some_and(Effect::is_surely_small);
+        undecided |= is_undecided(test, alpha);
     }
     match (failed, undecided) {
         (true, _) => Verdict::Inconsistent,
         (false, true) => Verdict::Inconclusive,
         (false, false) => Verdict::Consistent,
     }
+}
+
+/// A judged test that could not tell: no p-value, or a sure deviation whose size may or may not matter.
+pub fn is_undecided(test: &Test, alpha: f64) -> bool {
+    let unsure = !test.effect.as_ref().is_some_and(Effect::is_surely_small);
+    test.adjusted_p_value.is_nan() || (test.pass && test.adjusted_p_value < alpha && unsure)
 }

@@ -1,10 +1,9 @@
 //! Is the innovation sequence white? Streaming autocorrelation, Ljung-Box, the largest lag, and Bartlett's cumulative periodogram.
 
-use realfft::RealFftPlanner;
-
 use super::Test;
 use super::effect::{AUTOCORRELATION_TOLERANCE, Effect, PERIODOGRAM_TOLERANCE, PREDICTABLE_TOLERANCE};
 use crate::numerics::distribution::{chi_square_quantile, chi_square_sf, kolmogorov_sf, normal_quantile, normal_sf};
+use crate::signal::spectrum::periodogram;
 
 /// Sums for the autocorrelation of a sequence at lags 1..=L, in one pass with memory for L samples.
 ///
@@ -101,13 +100,14 @@ impl Autocorrelation {
         self.fourth
     }
 
-    /// The tests over all lags, at level `alpha`.
+    /// The tests over all lags, but no more than a tenth of the samples, at level `alpha`.
     pub fn whiteness(&self, alpha: f64) -> Whiteness {
         let n = self.count as f64;
         let total = n * (n + 2.0);
         let pairs: Vec<f64> = self.pairs.iter().map(|p| (p + self.full) as f64).collect();
-        // lags with no pair at all say nothing
-        let used: Vec<usize> = (0..self.lags()).filter(|&i| pairs[i] > 0.0).collect();
+        // at most n/10 lags, where the chi-square approximation holds; lags with no pair at all say nothing
+        let most = self.lags().min((self.count / 10).max(1) as usize);
+        let used: Vec<usize> = (0..most).filter(|&i| pairs[i] > 0.0).collect();
         let normalised: Vec<f64> =
             used.iter().map(|&i| self.products[i] / self.squares * (total / pairs[i]).sqrt()).collect();
         let correlation: Vec<f64> = used.iter().map(|&i| self.products[i] / self.squares * n / pairs[i]).collect();
@@ -290,15 +290,15 @@ pub fn cumulative_periodogram(series: &[f64], alpha: f64) -> Option<CumulativePe
     if ordinates < 8 {
         return None;
     }
-    let plan = RealFftPlanner::<f64>::new().plan_fft_forward(n);
-    let mut input = series.to_vec();
-    let mut output = plan.make_output_vec();
-    plan.process(&mut input, &mut output).ok()?;
-    let mut total = 0.0;
-    let mut share: Vec<f64> = output[1..=ordinates]
+    let spectrum = periodogram(series, 1.0);
+    let mut total = 0.0f64;
+    let mut share: Vec<f64> = spectrum
+        .psd
         .iter()
-        .map(|c| {
-            total += c.norm_sqr();
+        .skip(1)
+        .take(ordinates)
+        .map(|power| {
+            total += power;
             total
         })
         .collect();

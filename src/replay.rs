@@ -1,1 +1,0 @@
-//! A log through a design to a verdict (floor 4).

@@ -1,0 +1,241 @@
+//! From the running sums to tests, effects and the verdict.
+//!
+//! Per axis: `start` (does the log begin where x0 and P0 say?), `nis` (mean size of the innovations), `whiteness` (largest
+//! autocorrelation of lags 1–50), `ljung_box` (all these lags together), `low_frequency` (innovations averaged over a quarter to
+//! sixteen times the filter's time constant; see [`crate::consistency::low_frequency`]), `cumulative_periodogram` (shape of their
+//! low-frequency spectrum) and, behind a gate, `rejected`. Holm's adjustment runs over all tests and axes;
+//! [`effect::judge`](crate::consistency::effect::judge) states how p-values and effect sizes make the verdict.
+
+use super::{
+    AxisReplay, AxisResult, FinalState, LowFrequencySummary, Nis, ReplayResult, Replayer, Start, WhitenessSummary,
+};
+use crate::consistency::effect::{self, Effect};
+use crate::consistency::normalized::{gated_moments, moment_matched};
+use crate::consistency::whiteness::Whiteness;
+use crate::consistency::{Test, Verdict};
+use crate::filter::AxisDesign;
+use crate::numerics::distribution::{chi_square_cdf, chi_square_quantile, chi_square_sf, normal_quantile, normal_sf};
+
+/// With fewer accepted samples no test is made.
+const FEWEST_SAMPLES: u64 = 30;
+/// Share of rejected samples, beyond what the gate rejects of a true design, that is tolerated.
+const REJECTED_TOLERANCE: f64 = 0.01;
+
+/// All statistics of a finished replay.
+pub(super) fn conclude(replayer: Replayer) -> ReplayResult {
+    let Replayer { options, design, log_axes, axes, .. } = replayer;
+    let mut tests = Vec::new();
+    let mut results = Vec::new();
+    let mut short = Vec::new();
+    for ((axis, design), log_axis) in axes.into_iter().zip(&design.axes).zip(log_axes) {
+        if let Some(reason) = too_short(&axis, design) {
+            short.push(reason);
+        }
+        let (result, its_tests) = axis_result(axis, design, log_axis, options.alpha);
+        results.push(result);
+        tests.extend(its_tests);
+    }
+    let verdict = effect::judge(&mut tests, options.alpha, short.is_empty());
+    ReplayResult {
+        format: "kfdesign-replay/1".to_string(),
+        verdict,
+        meaning: meaning(verdict, options.alpha, &tests, &results, &short),
+        alpha: options.alpha,
+        gate: options.gate,
+        quantity: design.quantity,
+        sample_rate: design.sample_rate_hz,
+        axes: results,
+        tests,
+    }
+}
+
+/// Why this axis cannot be judged, if so.
+fn too_short(axis: &AxisReplay, design: &AxisDesign) -> Option<String> {
+    let accepted = axis.autocorrelation.count();
+    if axis.low_frequency.is_enough() && accepted >= FEWEST_SAMPLES {
+        return None;
+    }
+    if accepted < axis.samples / 2 {
+        return Some(format!("{}: only {accepted} of {} samples were accepted", design.name, axis.samples));
+    }
+    let needed = axis.low_frequency.samples_needed() * axis.every;
+    Some(format!(
+        "{}: {accepted} accepted samples are too few to judge the drift, {needed} are needed ({:.4} s)",
+        design.name,
+        needed as f64 * design.model.dt
+    ))
+}
+
+fn axis_result(axis: AxisReplay, design: &AxisDesign, log_axis: String, alpha: f64) -> (AxisResult, Vec<Test>) {
+    let name = design.name.as_str();
+    let dt = design.model.dt * axis.every as f64;
+    let sums = &axis.autocorrelation;
+    let accepted = sums.count();
+    let mut result = AxisResult {
+        name: name.to_string(),
+        log_axis,
+        samples: axis.samples,
+        accepted,
+        unusable: axis.unusable,
+        gaps: axis.gaps,
+        missing: axis.missing,
+        rejected: axis.rejected,
+        log_likelihood: axis.log_likelihood.value(),
+        final_state: final_state(&axis, design),
+        nis: None,
+        whiteness: None,
+        low_frequency: Vec::new(),
+        start: None,
+        trace: axis.trace.points().to_vec(),
+        autocorrelation: Vec::new(),
+        cumulative_periodogram: Vec::new(),
+    };
+    let mut tests = Vec::new();
+    if accepted + axis.rejected < FEWEST_SAMPLES {
+        return (result, tests);
+    }
+    let (expected, variance) = axis.gate.map_or((1.0, 2.0), gated_moments);
+    if let Some(gate) = axis.gate {
+        tests.push(rejected_test(name, gate, axis.rejected, accepted, alpha));
+    }
+    if accepted < FEWEST_SAMPLES {
+        return (result, tests);
+    }
+    if axis.start.information > 0.0 {
+        let (start, test) = start_test(name, axis.start.score, axis.start.information, alpha);
+        result.start = Some(start);
+        tests.push(test);
+    }
+    let whiteness = sums.whiteness(alpha);
+    let nis = moment_matched(sums.squares(), accepted, expected, variance, alpha);
+    tests.push(nis.nis(name, nis_error(sums.squares(), sums.fourth(), &whiteness), alpha));
+    result.nis = Some(Nis { mean: nis.mean, expected, lower: nis.lower, upper: nis.upper, p_value: nis.p_value });
+    tests.extend(whiteness.tests(name, dt, alpha));
+    for block in axis.low_frequency.results(expected, alpha) {
+        tests.push(block.test(name, dt));
+        result.low_frequency.push(LowFrequencySummary {
+            block_s: block.length as f64 * dt,
+            blocks: block.blocks,
+            ratio: block.ratio,
+            lower: block.lower,
+            upper: block.upper,
+            p_value: block.p_value,
+            interval: block.interval,
+            detects: block.detects,
+        });
+    }
+    if let Some((length, periodogram)) = axis.low_frequency.periodogram(alpha) {
+        let interval_s = length as f64 * dt;
+        tests.push(periodogram.test(name, interval_s));
+        let blocks = 2 * periodogram.ordinates + 1;
+        result.cumulative_periodogram = thinned(&periodogram.share)
+            .map(|(i, share)| ((i + 1) as f64 / (blocks as f64 * interval_s), share))
+            .collect();
+    }
+    result.whiteness = Some(WhitenessSummary {
+        max_abs_autocorrelation: whiteness.max_abs_autocorrelation,
+        lag: whiteness.max_lag,
+        interval: whiteness.interval,
+        ljung_box: whiteness.ljung_box,
+        ljung_box_p_value: whiteness.ljung_box_upper_p_value,
+        lags: whiteness.lags,
+    });
+    result.autocorrelation = whiteness.autocorrelation;
+    (result, tests)
+}
+
+/// At most a thousand values with their index, for a figure.
+fn thinned(values: &[f64]) -> impl Iterator<Item = (usize, f64)> + '_ {
+    let step = values.len().div_ceil(1000).max(1);
+    values.iter().copied().enumerate().step_by(step)
+}
+
+fn final_state(axis: &AxisReplay, design: &AxisDesign) -> Vec<FinalState> {
+    let states = design.model.states.iter().enumerate();
+    states
+        .map(|(i, state)| FinalState {
+            name: state.name.clone(),
+            unit: state.unit.clone(),
+            value: axis.kalman.x[i],
+            sigma: axis.kalman.p[(i, i)].max(0.0).sqrt(),
+        })
+        .collect()
+}
+
+/// Standard error of the mean of y² from the data's own spread, √(var(y²)·(1 + 2 Σ ρ_h²)/n): the squares of a Gaussian process
+/// have the squared autocorrelation; each r_h² is lowered by 1/n, what it is without any correlation.
+fn nis_error(squares: f64, fourth: f64, whiteness: &Whiteness) -> f64 {
+    let n = whiteness.samples as f64;
+    let variance = (fourth / n - (squares / n).powi(2)).max(0.0);
+    let correlated: f64 = whiteness.autocorrelation.iter().map(|r| (r * r - 1.0 / n).max(0.0)).sum();
+    (variance * (1.0 + 2.0 * correlated) / n).sqrt()
+}
+
+/// score/√information is N(0, 1); score/information is the shift of x0 in standard deviations of P0.
+fn start_test(axis: &str, score: f64, information: f64, alpha: f64) -> (Start, Test) {
+    let z = score / information.sqrt();
+    let sigmas = score / information;
+    let p_value = (2.0 * normal_sf(z.abs())).min(1.0);
+    let bound = normal_quantile(1.0 - alpha / 2.0);
+    let meaning = if z.abs() > bound {
+        format!(
+            "the log starts {sigmas:.2} sigma from x0: its bias is outside what P0 allows; raise the turn-on bias (the other tests feel this start too)"
+        )
+    } else {
+        "the log starts where x0 and P0 say".to_string()
+    };
+    (Start { sigmas, p_value }, Test::new(axis, "start", z, [-bound, bound], p_value, meaning))
+}
+
+/// Number of rejected samples against the Poisson law of a true design (which is conservative beside the binomial).
+fn rejected_test(axis: &str, gate: f64, rejected: u64, accepted: u64, alpha: f64) -> Test {
+    let total = (rejected + accepted) as f64;
+    let expected = total * 2.0 * normal_sf(gate);
+    let count = rejected as f64;
+    // P(X ≥ k) = P(χ²_{2k} ≤ 2λ), P(X ≤ k) = P(χ²_{2k+2} > 2λ)
+    let more = if rejected == 0 { 1.0 } else { chi_square_cdf(2.0 * expected, 2.0 * count) };
+    let fewer = chi_square_sf(2.0 * expected, 2.0 * count + 2.0);
+    let low = if rejected == 0 { 0.0 } else { chi_square_quantile(alpha / 2.0, 2.0 * count) / 2.0 };
+    let high = chi_square_quantile(1.0 - alpha / 2.0, 2.0 * count + 2.0) / 2.0;
+    let share = count / total;
+    let normal = expected / total;
+    // bounds of the share by the normal approximation, for the eye; the p-value is the Poisson one
+    let spread = normal_quantile(1.0 - alpha / 2.0) * expected.sqrt() / total;
+    let meaning = format!(
+        "{rejected} samples ({:.3} %) are outside {gate} sigma; a true design rejects {expected:.3}",
+        100.0 * share
+    );
+    let p_value = (2.0 * more.min(fewer)).min(1.0);
+    Test::new(axis, "rejected", share, [(normal - spread).max(0.0), normal + spread], p_value, meaning).with_effect(
+        Effect::new(
+            "rejected_share",
+            share,
+            [low / total, high / total],
+            [(normal - REJECTED_TOLERANCE).max(0.0), normal + REJECTED_TOLERANCE],
+        ),
+    )
+}
+
+/// The verdict in one or two sentences.
+fn meaning(verdict: Verdict, alpha: f64, tests: &[Test], axes: &[AxisResult], short: &[String]) -> String {
+    let tell =
+        |chosen: Vec<&Test>| chosen.iter().map(|t| format!("{}: {}", t.axis, t.meaning)).collect::<Vec<_>>().join("; ");
+    match verdict {
+        Verdict::Inconsistent => tell(tests.iter().filter(|t| !t.pass).collect()),
+        Verdict::Inconclusive if !short.is_empty() => short.join("; "),
+        Verdict::Inconclusive => format!(
+            "deviations are real but the log is too short to tell whether they matter: {}",
+            tell(tests.iter().filter(|t| effect::is_undecided(t, alpha)).collect())
+        ),
+        Verdict::Consistent => {
+            let longest =
+                axes.iter().filter_map(|a| a.low_frequency.last().map(|l| l.block_s)).fold(f64::INFINITY, f64::min);
+            let drift = if longest.is_finite() {
+                format!(", and their slow part is as predicted up to averages of {longest:.4} s")
+            } else {
+                String::new()
+            };
+            format!("the innovations are white and as large as the filter says{drift}")
+        }
+    }
+}

@@ -1,12 +1,32 @@
 //! `kfdesign schema`.
 
-use super::Status;
+use clap::ValueEnum;
+
+use super::{Status, output};
+use crate::filter::FilterDesign;
+use crate::params::Params;
 
 /// The JSON schema of a document
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+#[command(after_help = "Example: kfdesign schema params > params.schema.json")]
+pub struct Args {
+    /// Which document
+    #[arg(value_enum)]
+    document: Document,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Document {
+    /// params.json: noise parameters
+    Params,
+    /// filter.json: a filter design
+    Filter,
+}
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
-    let _ = args;
-    todo!()
+    output::print_json(&match args.document {
+        Document::Params => Params::schema(),
+        Document::Filter => FilterDesign::schema(),
+    })?;
+    Ok(Status::Done)
 }

@@ -1,28 +1,20 @@
 //! The params.json document: versioned, units on every value, intervals, provenance (floor 1).
 
+//!
+//! `place` reads JSON key by key with the place of every complaint, `measured` is a value with its unit, `document` the
+//! layout of the file and its schema.
+
+mod document;
+mod measured;
+pub mod place;
+
 use std::path::Path;
 
 use crate::noise::{NoiseModel, Term};
-use crate::units::{Quantity, Unit, UnitError};
+use crate::units::{Quantity, UnitError};
 
-/// A value with its unit as written and, if known, a 95 % interval in the same unit.
-/// Serialised as `{"value": 0.0562, "unit": "deg/s/sqrt(Hz)", "interval": [0.0555, 0.0569]}`; the short form `"0.0562 deg/s/sqrt(Hz)"` is read too.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Measured {
-    pub value: f64,
-    pub unit: Unit,
-    pub interval: Option<[f64; 2]>,
-}
-
-impl Measured {
-    pub fn si(&self) -> f64 {
-        self.unit.to_si(self.value)
-    }
-    /// From SI into `unit`; the interval is SI too.
-    pub fn from_si(value: f64, interval: Option<[f64; 2]>, unit: Unit) -> Self {
-        Measured { value: unit.from_si(value), interval: interval.map(|i| i.map(|v| unit.from_si(v))), unit }
-    }
-}
+pub use measured::Measured;
+use place::{KeyError, Place};
 
 /// One noise term as documented: kind with its coefficients as [`Measured`].
 #[derive(Clone, Debug, PartialEq)]
@@ -99,26 +91,59 @@ impl AxisParams {
 }
 
 impl TermEntry {
+    /// The term with SI coefficients.
     pub fn to_term(&self) -> Term {
-        todo!()
+        match self {
+            TermEntry::Quantization { coefficient } => Term::Quantization { coefficient: coefficient.si() },
+            TermEntry::White { density } => Term::White { density: density.si() },
+            TermEntry::BiasInstability { coefficient } => Term::BiasInstability { coefficient: coefficient.si() },
+            TermEntry::GaussMarkov { std_dev, correlation_time } => {
+                Term::GaussMarkov { std_dev: std_dev.si(), correlation_time: correlation_time.si() }
+            }
+            TermEntry::RateRandomWalk { density } => Term::RateRandomWalk { density: density.si() },
+            TermEntry::RateRamp { slope } => Term::RateRamp { slope: slope.si() },
+        }
+    }
+}
+
+impl AxisParams {
+    /// Reads an axis that stands in another document; `place` names where.
+    pub fn from_place(place: &Place<'_>, quantity: Quantity) -> Result<AxisParams, KeyError> {
+        document::axis(place, quantity)
     }
 }
 
 impl Params {
+    /// Reads params.json; every complaint names `path` and the key.
     pub fn from_json(text: &str, path: &str) -> Result<Params, ParamsError> {
-        let _ = (text, path);
-        todo!()
+        let value = place::parse(text).map_err(|e| ParamsError::Syntax {
+            path: path.into(),
+            line: e.line,
+            column: e.column,
+            message: e.message,
+        })?;
+        document::params(&Place::root(&value)).map_err(|e| ParamsError::Invalid {
+            path: path.into(),
+            key: e.key,
+            message: e.message,
+        })
     }
     pub fn read(path: &Path) -> Result<Params, ParamsError> {
-        let _ = path;
-        todo!()
+        let shown = path.display().to_string();
+        match std::fs::read_to_string(path) {
+            Ok(text) => Params::from_json(&text, &shown),
+            Err(e) => Err(ParamsError::Read { path: shown, reason: e.to_string() }),
+        }
     }
     /// Pretty JSON with a trailing newline; reading it back gives the same document.
     pub fn to_json(&self) -> String {
-        todo!()
+        // no map with keys other than text is in the document, so that serialising cannot fail
+        let mut text = serde_json::to_string_pretty(self).unwrap_or_default();
+        text.push('\n');
+        text
     }
     /// The published JSON schema.
     pub fn schema() -> serde_json::Value {
-        todo!()
+        schemars::schema_for!(document::ParamsDocument).to_value()
     }
 }

@@ -1,0 +1,353 @@
+//! params.json itself: what is written, what is read, the schema.
+
+use std::borrow::Cow;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+use serde::{Serialize, Serializer};
+
+use super::measured::Range;
+use super::place::{KeyError, Object, Place};
+use super::{AxisParams, Measured, NotIdentified, Params, Source, TermEntry};
+use crate::units::{Dimension, Quantity, Unit};
+
+pub(super) const FORMAT: &str = "kfdesign-params/1";
+
+const TERM_KEYS: [&str; 6] =
+    ["quantization", "white", "bias_instability", "gauss_markov", "rate_random_walk", "rate_ramp"];
+
+#[derive(Serialize, JsonSchema)]
+enum Format {
+    #[serde(rename = "kfdesign-params/1")]
+    Params1,
+}
+
+/// Noise parameters of an inertial sensor.
+#[derive(Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "Params")]
+pub(super) struct ParamsDocument {
+    format: Format,
+    quantity: Quantity,
+    /// Frequency, for example "100 Hz".
+    sample_rate: Measured,
+    #[schemars(length(min = 1))]
+    axes: Vec<AxisDocument>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    source: Option<SourceDocument>,
+}
+
+/// One axis: its bias and the noise terms that are present.
+#[derive(Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "AxisParams")]
+struct AxisDocument {
+    /// Unique in the document.
+    name: String,
+    /// Constant bias.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bias: Option<Measured>,
+    /// Spread of the bias from one power-up to the next.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    turn_on_bias: Option<StdDev>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    quantization: Option<OneOrMany<Coefficient>>,
+    /// Root of the two-sided power spectral density.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    white: Option<OneOrMany<Density>>,
+    /// Flicker: the Allan deviation's floor is 0.664 times the coefficient.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bias_instability: Option<OneOrMany<Coefficient>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gauss_markov: Option<OneOrMany<GaussMarkov>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rate_random_walk: Option<OneOrMany<Density>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rate_ramp: Option<OneOrMany<Slope>>,
+    /// What the log cannot tell.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    not_identified: Vec<NotIdentifiedDocument>,
+}
+
+#[derive(Serialize, JsonSchema)]
+#[serde(untagged)]
+enum OneOrMany<T> {
+    One(T),
+    Many(Vec<T>),
+}
+
+#[derive(Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct StdDev {
+    std_dev: Measured,
+}
+
+#[derive(Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Density {
+    density: Measured,
+}
+
+#[derive(Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Coefficient {
+    coefficient: Measured,
+}
+
+#[derive(Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Slope {
+    slope: Measured,
+}
+
+/// First-order Gauss-Markov process: stationary standard deviation and 1/e correlation time.
+#[derive(Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct GaussMarkov {
+    std_dev: Measured,
+    correlation_time: Measured,
+}
+
+#[derive(Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "NotIdentified")]
+struct NotIdentifiedDocument {
+    /// The term, or one of its parameters: "gauss_markov.correlation_time".
+    term: String,
+    reason: String,
+    /// Length of log that would tell.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    needed_log: Option<Measured>,
+}
+
+/// Where the numbers come from.
+#[derive(Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "Source")]
+struct SourceDocument {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    log: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sha256: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    samples: Option<u64>,
+    /// Time from the first to the last sample.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    span: Option<Measured>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    method: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    version: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    note: Option<String>,
+}
+
+fn in_unit(value: f64, unit: &str) -> Option<Measured> {
+    Unit::parse(unit).ok().map(|unit| Measured { value, unit, interval: None })
+}
+
+/// One object for a single term, a list for more.
+fn one_or_many<T>(mut items: Vec<T>) -> Option<OneOrMany<T>> {
+    if items.len() > 1 { Some(OneOrMany::Many(items)) } else { items.pop().map(OneOrMany::One) }
+}
+
+impl From<&AxisParams> for AxisDocument {
+    fn from(axis: &AxisParams) -> Self {
+        let (mut quantization, mut white, mut bias_instability) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut gauss_markov, mut rate_random_walk, mut rate_ramp) = (Vec::new(), Vec::new(), Vec::new());
+        for term in axis.terms.iter().cloned() {
+            match term {
+                TermEntry::Quantization { coefficient } => quantization.push(Coefficient { coefficient }),
+                TermEntry::White { density } => white.push(Density { density }),
+                TermEntry::BiasInstability { coefficient } => bias_instability.push(Coefficient { coefficient }),
+                TermEntry::GaussMarkov { std_dev, correlation_time } => {
+                    gauss_markov.push(GaussMarkov { std_dev, correlation_time });
+                }
+                TermEntry::RateRandomWalk { density } => rate_random_walk.push(Density { density }),
+                TermEntry::RateRamp { slope } => rate_ramp.push(Slope { slope }),
+            }
+        }
+        AxisDocument {
+            name: axis.name.clone(),
+            bias: axis.bias.clone(),
+            turn_on_bias: axis.turn_on_bias.clone().map(|std_dev| StdDev { std_dev }),
+            quantization: one_or_many(quantization),
+            white: one_or_many(white),
+            bias_instability: one_or_many(bias_instability),
+            gauss_markov: (!gauss_markov.is_empty()).then_some(OneOrMany::Many(gauss_markov)),
+            rate_random_walk: one_or_many(rate_random_walk),
+            rate_ramp: one_or_many(rate_ramp),
+            not_identified: axis
+                .not_identified
+                .iter()
+                .map(|n| NotIdentifiedDocument {
+                    term: n.term.clone(),
+                    reason: n.reason.clone(),
+                    needed_log: n.needed_log_s.and_then(|s| in_unit(s, "s")),
+                })
+                .collect(),
+        }
+    }
+}
+
+impl From<&Source> for SourceDocument {
+    fn from(source: &Source) -> Self {
+        SourceDocument {
+            log: source.log.clone(),
+            sha256: source.sha256.clone(),
+            samples: source.samples,
+            span: source.span_s.and_then(|s| in_unit(s, "s")),
+            method: source.method.clone(),
+            version: source.version.clone(),
+            note: source.note.clone(),
+        }
+    }
+}
+
+impl Serialize for AxisParams {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        AxisDocument::from(self).serialize(serializer)
+    }
+}
+
+impl JsonSchema for AxisParams {
+    fn schema_name() -> Cow<'static, str> {
+        AxisDocument::schema_name()
+    }
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        AxisDocument::json_schema(generator)
+    }
+}
+
+impl Serialize for Params {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let hertz = in_unit(self.sample_rate_hz, "Hz").ok_or_else(|| serde::ser::Error::custom("Hz is a unit"))?;
+        ParamsDocument {
+            format: Format::Params1,
+            quantity: self.quantity,
+            sample_rate: hertz,
+            axes: self.axes.iter().map(AxisDocument::from).collect(),
+            source: self.source.as_ref().map(SourceDocument::from),
+        }
+        .serialize(serializer)
+    }
+}
+
+/// The whole document.
+pub(super) fn params(root: &Place<'_>) -> Result<Params, KeyError> {
+    let object = root.document(FORMAT, "a parameter file", &["format", "quantity", "sample_rate", "axes", "source"])?;
+    let quantity = quantity(&object.required("quantity")?)?;
+    let sample_rate = object.required("sample_rate")?;
+    let sample_rate_hz = Measured::from_place(&sample_rate, Dimension::FREQUENCY, Range::Positive)?.si();
+    let list = object.required("axes")?;
+    let axes = list.list()?.iter().map(|p| axis(p, quantity)).collect::<Result<Vec<_>, _>>()?;
+    if axes.is_empty() {
+        return Err(list.error("there is no axis; at least one is needed"));
+    }
+    for (i, later) in axes.iter().enumerate() {
+        if let Some(j) = axes[..i].iter().position(|earlier| earlier.name == later.name) {
+            let key = format!("axes[{i}].name");
+            return Err(KeyError { key, message: format!("'{}' is the name of axes[{j}] too", later.name) });
+        }
+    }
+    let source = object.optional("source").map(|p| source(&p)).transpose()?;
+    Ok(Params { quantity, sample_rate_hz, axes, source })
+}
+
+pub(super) fn quantity(place: &Place<'_>) -> Result<Quantity, KeyError> {
+    match place.text()? {
+        "angular-rate" => Ok(Quantity::AngularRate),
+        "specific-force" => Ok(Quantity::SpecificForce),
+        other => Err(place.error(format!("expected \"angular-rate\" or \"specific-force\", found \"{other}\""))),
+    }
+}
+
+pub(super) fn axis(place: &Place<'_>, quantity: Quantity) -> Result<AxisParams, KeyError> {
+    let mut known = vec!["name", "bias", "turn_on_bias"];
+    known.extend(TERM_KEYS);
+    known.push("not_identified");
+    let object = place.object(&known)?;
+    let name = object.required("name")?;
+    let text = name.text()?;
+    if text.trim().is_empty() || text.chars().any(char::is_control) {
+        return Err(name.error("the name of an axis must be readable"));
+    }
+    let base = quantity.dimension();
+    let mut terms = Vec::new();
+    for key in TERM_KEYS {
+        let Some(place) = object.optional(key) else { continue };
+        for item in place.one_or_many()? {
+            terms.push(term(key, &item, base)?);
+        }
+    }
+    let turn_on_bias =
+        object.optional("turn_on_bias").map(|p| positive(&p.object(&["std_dev"])?, "std_dev", base)).transpose()?;
+    let not_identified = match object.optional("not_identified") {
+        Some(place) => place.list()?.iter().map(not_identified).collect::<Result<Vec<_>, _>>()?,
+        None => Vec::new(),
+    };
+    Ok(AxisParams {
+        name: text.to_string(),
+        bias: object.optional("bias").map(|p| Measured::from_place(&p, base, Range::Any)).transpose()?,
+        turn_on_bias,
+        terms,
+        not_identified,
+    })
+}
+
+fn term(key: &str, place: &Place<'_>, base: Dimension) -> Result<TermEntry, KeyError> {
+    Ok(match key {
+        "quantization" => TermEntry::Quantization {
+            coefficient: positive(&place.object(&["coefficient"])?, "coefficient", base.times_time(2))?,
+        },
+        "white" => TermEntry::White { density: positive(&place.object(&["density"])?, "density", base.times_time(1))? },
+        "bias_instability" => {
+            TermEntry::BiasInstability { coefficient: positive(&place.object(&["coefficient"])?, "coefficient", base)? }
+        }
+        "gauss_markov" => {
+            let object = place.object(&["std_dev", "correlation_time"])?;
+            TermEntry::GaussMarkov {
+                std_dev: positive(&object, "std_dev", base)?,
+                correlation_time: positive(&object, "correlation_time", Dimension::TIME)?,
+            }
+        }
+        "rate_random_walk" => TermEntry::RateRandomWalk {
+            density: positive(&place.object(&["density"])?, "density", base.times_time(-1))?,
+        },
+        _ => {
+            let slope = place.object(&["slope"])?.required("slope")?;
+            TermEntry::RateRamp { slope: Measured::from_place(&slope, base.times_time(-2), Range::Any)? }
+        }
+    })
+}
+
+fn positive(object: &Object<'_>, key: &str, expected: Dimension) -> Result<Measured, KeyError> {
+    Measured::from_place(&object.required(key)?, expected, Range::Positive)
+}
+
+fn not_identified(place: &Place<'_>) -> Result<NotIdentified, KeyError> {
+    let object = place.object(&["term", "reason", "needed_log"])?;
+    Ok(NotIdentified {
+        term: object.required("term")?.text()?.to_string(),
+        reason: object.required("reason")?.text()?.to_string(),
+        needed_log_s: seconds(&object, "needed_log")?,
+    })
+}
+
+fn seconds(object: &Object<'_>, key: &str) -> Result<Option<f64>, KeyError> {
+    let place = object.optional(key);
+    place.map(|p| Ok(Measured::from_place(&p, Dimension::TIME, Range::Positive)?.si())).transpose()
+}
+
+fn source(place: &Place<'_>) -> Result<Source, KeyError> {
+    let object = place.object(&["log", "sha256", "samples", "span", "method", "version", "note"])?;
+    let text = |key: &str| object.optional(key).map(|p| p.text().map(str::to_string)).transpose();
+    Ok(Source {
+        log: text("log")?,
+        sha256: text("sha256")?,
+        samples: object.optional("samples").map(|p| p.count()).transpose()?,
+        span_s: seconds(&object, "span")?,
+        method: text("method")?,
+        version: text("version")?,
+        note: text("note")?,
+    })
+}

@@ -1,0 +1,234 @@
+//! A JSON document read key by key, so that every complaint names its place: `axes[0].white.density`.
+//!
+//! Keys that are not known are refused by name, keys that stand twice are refused by the parser.
+
+use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
+use serde_json::{Map, Value};
+
+/// What is wrong at one place of a document.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{key}: {message}")]
+pub struct KeyError {
+    pub key: String,
+    pub message: String,
+}
+
+/// Text that is not JSON.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("line {line}, column {column}: not valid JSON: {message}")]
+pub struct SyntaxError {
+    pub line: usize,
+    pub column: usize,
+    pub message: String,
+}
+
+/// Parse JSON in which no object has a key twice.
+pub fn parse(text: &str) -> Result<Value, SyntaxError> {
+    let text = text.trim_start_matches('\u{feff}');
+    serde_json::from_str::<Strict>(text).map(|strict| strict.0).map_err(|error| {
+        let message = error.to_string();
+        let message = message.split(" at line ").next().unwrap_or_default().to_string();
+        SyntaxError { line: error.line(), column: error.column(), message }
+    })
+}
+
+/// A value and where it stands.
+#[derive(Clone, Debug)]
+pub struct Place<'a> {
+    key: String,
+    value: &'a Value,
+}
+
+/// An object all of whose keys are known.
+#[derive(Clone, Debug)]
+pub struct Object<'a> {
+    key: String,
+    map: &'a Map<String, Value>,
+}
+
+impl<'a> Place<'a> {
+    /// The whole document.
+    pub fn root(value: &'a Value) -> Place<'a> {
+        Place::at("", value)
+    }
+    /// A value that stands at `key` of a larger document.
+    pub fn at(key: &str, value: &'a Value) -> Place<'a> {
+        Place { key: key.to_string(), value }
+    }
+    pub fn key(&self) -> &str {
+        if self.key.is_empty() { "document" } else { &self.key }
+    }
+    pub fn value(&self) -> &'a Value {
+        self.value
+    }
+    pub fn error(&self, message: impl Into<String>) -> KeyError {
+        KeyError { key: self.key().to_string(), message: message.into() }
+    }
+    /// An object with no other keys than these.
+    pub fn object(&self, known: &[&str]) -> Result<Object<'a>, KeyError> {
+        let Value::Object(map) = self.value else {
+            return Err(self.error(format!(
+                "expected an object with {}, found {}",
+                known.join(", "),
+                describe(self.value)
+            )));
+        };
+        let object = Object { key: self.key.clone(), map };
+        if let Some(unknown) = map.keys().find(|k| !known.contains(&k.as_str())) {
+            let meant = nearest(unknown, known).map(|n| format!("did you mean '{n}'? ")).unwrap_or_default();
+            let message = format!("unknown key; {meant}known here: {}", known.join(", "));
+            return Err(KeyError { key: object.path(unknown), message });
+        }
+        Ok(object)
+    }
+    /// The elements of a list.
+    pub fn list(&self) -> Result<Vec<Place<'a>>, KeyError> {
+        let Value::Array(values) = self.value else {
+            return Err(self.error(format!("expected a list, found {}", describe(self.value))));
+        };
+        Ok(values.iter().enumerate().map(|(i, v)| Place { key: format!("{}[{i}]", self.key), value: v }).collect())
+    }
+    /// The elements of a list, or the one object that stands for a list of one.
+    pub fn one_or_many(&self) -> Result<Vec<Place<'a>>, KeyError> {
+        if self.value.is_object() { Ok(vec![self.clone()]) } else { self.list() }
+    }
+    pub fn text(&self) -> Result<&'a str, KeyError> {
+        self.value.as_str().ok_or_else(|| self.error(format!("expected a text, found {}", describe(self.value))))
+    }
+    /// A finite number.
+    pub fn number(&self) -> Result<f64, KeyError> {
+        self.value
+            .as_f64()
+            .filter(|x| x.is_finite())
+            .ok_or_else(|| self.error(format!("expected a number, found {}", describe(self.value))))
+    }
+    /// A whole number, not negative.
+    pub fn count(&self) -> Result<u64, KeyError> {
+        self.value
+            .as_u64()
+            .ok_or_else(|| self.error(format!("expected a whole number of at least 0, found {}", describe(self.value))))
+    }
+    /// Checks the `format` key and returns the document's object.
+    pub fn document(&self, format: &str, what: &str, known: &[&str]) -> Result<Object<'a>, KeyError> {
+        let expected = format!("{what} has \"format\": \"{format}\"");
+        let at = |message: String| KeyError { key: "format".into(), message };
+        match self.value.get("format") {
+            Some(Value::String(found)) if found == format => self.object(known),
+            Some(found) => Err(at(format!("found {}, but {expected}", describe(found)))),
+            None if self.value.is_object() => Err(at(format!("missing; {expected}"))),
+            None => Err(self.error(format!("found {}; {expected}", describe(self.value)))),
+        }
+    }
+}
+
+impl<'a> Object<'a> {
+    /// The value of a key that must be there.
+    pub fn required(&self, key: &str) -> Result<Place<'a>, KeyError> {
+        self.optional(key).ok_or_else(|| KeyError { key: self.path(key), message: "missing".into() })
+    }
+    /// The value of a key that may be absent (or null).
+    pub fn optional(&self, key: &str) -> Option<Place<'a>> {
+        let value = self.map.get(key).filter(|v| !v.is_null())?;
+        Some(Place { key: self.path(key), value })
+    }
+    fn path(&self, key: &str) -> String {
+        if self.key.is_empty() { key.to_string() } else { format!("{}.{key}", self.key) }
+    }
+}
+
+/// "the text \"abc\"", "the number 3", "a list": what a message says was found.
+pub(super) fn describe(value: &Value) -> String {
+    match value {
+        Value::Null => "null".into(),
+        Value::Bool(b) => format!("{b}"),
+        Value::Number(n) => format!("the number {n}"),
+        Value::String(s) if s.chars().count() <= 60 => format!("the text \"{s}\""),
+        Value::String(_) => "a long text".into(),
+        Value::Array(a) if a.is_empty() => "an empty list".into(),
+        Value::Array(_) => "a list".into(),
+        Value::Object(_) => "an object".into(),
+    }
+}
+
+/// The known key that a misspelt one most likely means.
+fn nearest<'k>(found: &str, known: &[&'k str]) -> Option<&'k str> {
+    let found = found.to_lowercase();
+    let limit = (found.chars().count() / 3).max(1) + 1;
+    known
+        .iter()
+        .map(|k| (if k.starts_with(&found) || found.starts_with(k) { 1 } else { edits(&found, k) }, *k))
+        .filter(|(distance, _)| *distance <= limit)
+        .min_by_key(|(distance, _)| *distance)
+        .map(|(_, k)| k)
+}
+
+/// Levenshtein distance.
+fn edits(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, y) in b.iter().enumerate() {
+            let substitution = diagonal + usize::from(x != *y);
+            diagonal = row[j + 1];
+            row[j + 1] = substitution.min(diagonal + 1).min(row[j] + 1);
+        }
+    }
+    row[b.len()]
+}
+
+/// JSON without repeated keys.
+struct Strict(Value);
+
+impl<'de> Deserialize<'de> for Strict {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(StrictVisitor).map(Strict)
+    }
+}
+
+struct StrictVisitor;
+
+impl<'de> Visitor<'de> for StrictVisitor {
+    type Value = Value;
+
+    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("a JSON value")
+    }
+    fn visit_bool<E>(self, v: bool) -> Result<Value, E> {
+        Ok(v.into())
+    }
+    fn visit_i64<E>(self, v: i64) -> Result<Value, E> {
+        Ok(v.into())
+    }
+    fn visit_u64<E>(self, v: u64) -> Result<Value, E> {
+        Ok(v.into())
+    }
+    fn visit_f64<E>(self, v: f64) -> Result<Value, E> {
+        Ok(v.into())
+    }
+    fn visit_str<E>(self, v: &str) -> Result<Value, E> {
+        Ok(v.into())
+    }
+    fn visit_unit<E>(self) -> Result<Value, E> {
+        Ok(Value::Null)
+    }
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Value, A::Error> {
+        let mut values = Vec::new();
+        while let Some(Strict(value)) = seq.next_element()? {
+            values.push(value);
+        }
+        Ok(Value::Array(values))
+    }
+    fn visit_map<A: MapAccess<'de>>(self, mut access: A) -> Result<Value, A::Error> {
+        let mut map = Map::new();
+        while let Some(key) = access.next_key::<String>()? {
+            let Strict(value) = access.next_value()?;
+            if map.contains_key(&key) {
+                return Err(A::Error::custom(format!("key '{key}' stands twice")));
+            }
+            map.insert(key, value);
+        }
+        Ok(Value::Object(map))
+    }
+}

@@ -29,17 +29,23 @@ pub fn phase(rate: &[f64], dt: f64) -> Vec<f64> {
     phase
 }
 
+/// Rate samples that one difference at averaging factor `m` needs.
+pub fn fewest_samples(deviation: Deviation, m: u64) -> u64 {
+    match deviation {
+        Deviation::Adev | Deviation::Oadev | Deviation::Totdev => m.saturating_mul(2),
+        // the sums of m second differences span 3m phase points
+        Deviation::Mdev => m.saturating_mul(3) - 1,
+        Deviation::Hdev | Deviation::Ohdev => m.saturating_mul(3),
+    }
+}
+
 /// Largest averaging factor with at least one difference in `samples` rate samples.
 pub fn largest_factor(deviation: Deviation, samples: usize) -> u64 {
-    let spans = match deviation {
-        Deviation::Adev | Deviation::Oadev | Deviation::Totdev => 2,
-        Deviation::Mdev | Deviation::Hdev | Deviation::Ohdev => 3,
-    };
-    let points = samples as u64 + 1;
+    let samples = samples as u64;
     match deviation {
-        // N − 3m + 1 averaged differences
-        Deviation::Mdev => points / spans,
-        _ => samples as u64 / spans,
+        Deviation::Adev | Deviation::Oadev | Deviation::Totdev => samples / 2,
+        Deviation::Mdev => (samples + 1) / 3,
+        Deviation::Hdev | Deviation::Ohdev => samples / 3,
     }
 }
 
@@ -71,8 +77,7 @@ pub fn variance(deviation: Deviation, phase: &[f64], dt: f64, m: u64) -> Result<
     let samples = phase.len().saturating_sub(1);
     let terms = terms(deviation, samples, m);
     if terms == 0 {
-        let spans = (1..).find(|n| largest_factor(deviation, *n) >= 1).unwrap_or(3);
-        let needed = usize::try_from(m.max(1)).unwrap_or(usize::MAX).saturating_mul(spans);
+        let needed = usize::try_from(fewest_samples(deviation, m.max(1))).unwrap_or(usize::MAX);
         return Err(AllanError::TooShort { samples, needed });
     }
     let (x, count, m) = (phase, terms as usize, m as usize);

@@ -2,9 +2,11 @@
 
 pub mod deviation;
 pub mod edf;
+mod lag_sum;
 pub mod noise_id;
 pub mod tau;
 
+use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -78,15 +80,78 @@ pub enum AllanError {
 
 /// The curve of uniformly sampled rate data (SI), intervals with the degrees of freedom of the power law identified at each point.
 /// [`AllanCurve::refine`] replaces them by the exact ones of a fitted mixture.
+///
+/// `rate` without gaps, `dt` in s. Fails on fewer samples than one difference needs and on NaN or infinite samples.
 pub fn curve(rate: &[f64], dt: f64, deviation: Deviation, grid: TauGrid) -> Result<AllanCurve, AllanError> {
-    let _ = (rate, dt, deviation, grid);
-    todo!()
+    check(rate, deviation, 0)?;
+    curve_of(&deviation::phase(rate, dt), dt, deviation, grid)
+}
+
+/// The same from the phase itself (angle of a gyro, velocity of an accelerometer; unit·s): n + 1 points stand for n rate samples.
+pub fn curve_from_phase(phase: &[f64], dt: f64, deviation: Deviation, grid: TauGrid) -> Result<AllanCurve, AllanError> {
+    check(phase, deviation, 1)?;
+    curve_of(phase, dt, deviation, grid)
+}
+
+fn check(values: &[f64], kind: Deviation, extra: usize) -> Result<(), AllanError> {
+    let needed = deviation::fewest_samples(kind, 1) as usize + extra;
+    if values.len() < needed {
+        return Err(AllanError::TooShort { samples: values.len(), needed });
+    }
+    match values.iter().position(|v| !v.is_finite()) {
+        Some(index) => Err(AllanError::NotFinite { index }),
+        None => Ok(()),
+    }
+}
+
+fn curve_of(phase: &[f64], dt: f64, kind: Deviation, grid: TauGrid) -> Result<AllanCurve, AllanError> {
+    let samples = phase.len().saturating_sub(1);
+    let factors = tau::averaging_factors(grid, deviation::largest_factor(kind, samples));
+    let mut points: Vec<AllanPoint> = factors
+        .par_iter()
+        .map(|&m| {
+            let estimate = deviation::variance(kind, phase, dt, m)?;
+            Ok(AllanPoint {
+                m,
+                tau_s: m as f64 * dt,
+                deviation: estimate.variance.sqrt(),
+                lower: f64::NAN,
+                upper: f64::NAN,
+                edf: f64::NAN,
+                terms: estimate.terms,
+                noise: noise_id::identify(phase, m as usize),
+            })
+        })
+        .collect::<Result<_, AllanError>>()?;
+    // where too few averages are left to identify the noise, the last type that was seen is taken
+    let mut last = NoiseType::Unknown;
+    for point in &mut points {
+        if point.noise != NoiseType::Unknown {
+            last = point.noise;
+        }
+        point.set_edf(edf::power_law_degrees_of_freedom(kind, samples, point.m, last));
+    }
+    Ok(AllanCurve { deviation: kind, dt, samples, points })
+}
+
+impl AllanPoint {
+    fn set_edf(&mut self, edf: f64) {
+        self.edf = edf;
+        (self.lower, self.upper) = edf::interval(self.deviation, edf);
+    }
 }
 
 impl AllanCurve {
-    /// Exact degrees of freedom and intervals for this noise mixture (`formulas`: M² r₀² / [M r₀² + 2 Σ (M−h) r_h²]).
+    /// Degrees of freedom and intervals for this noise mixture instead of the identified power laws: exact for ADEV,
+    /// overlapping ADEV, HDEV and overlapping HDEV; for MDEV and TOTDEV those of the law that dominates at each tau.
+    /// Points for which the mixture says nothing (an empty one) are left as they are.
     pub fn refine(&mut self, model: &NoiseModel) {
-        let _ = model;
-        todo!()
+        let (kind, samples, dt) = (self.deviation, self.samples, self.dt);
+        self.points.par_iter_mut().for_each(|point| {
+            let edf = edf::degrees_of_freedom(kind, samples, point.m, dt, model);
+            if !edf.is_nan() {
+                point.set_edf(edf);
+            }
+        });
     }
 }

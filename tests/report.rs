@@ -1,1 +1,267 @@
-//! Tests of report.
+//! Figures and pages. `KFDESIGN_GALLERY=DIR cargo test report::` writes them to DIR, to be looked at.
+
+use kfdesign::consistency::Verdict;
+use kfdesign::report::figure::*;
+use kfdesign::report::page::{Badge, Page, Section};
+
+/// Reproducible standard normal numbers: only something to draw.
+struct Normals(u64);
+
+impl Normals {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 11) as f64 + 0.5) / (1u64 << 53) as f64
+    }
+    fn next(&mut self) -> f64 {
+        (-2.0 * self.uniform().ln()).sqrt() * (std::f64::consts::TAU * self.uniform()).cos()
+    }
+    fn take(&mut self, n: usize) -> Vec<f64> {
+        (0..n).map(|_| self.next()).collect()
+    }
+}
+
+/// White noise and one Gauss-Markov process, continuous form.
+fn components(tau: f64) -> (f64, f64) {
+    let (n, s, tc) = (0.0562_f64, 0.02806_f64, 193.93_f64);
+    let x = tau / tc;
+    let drift = s * s * (2.0 * x - 3.0 + 4.0 * (-x).exp() - (-2.0 * x).exp()) / (x * x);
+    (n / tau.sqrt(), drift.max(0.0).sqrt())
+}
+
+fn allan_data(axis: &str, seed: u64) -> Allan {
+    let mut noise = Normals(seed);
+    let taus: Vec<f64> = (0..38).map(|i| 0.01 * 10f64.powf(f64::from(i) * 0.14)).collect();
+    let points = taus.iter().map(|&tau| {
+        let (white, drift) = components(tau);
+        let truth = white.hypot(drift);
+        let relative = (0.6 * tau / 7200.0).sqrt() * 1.4;
+        let deviation = truth * (1.0 + 0.5 * relative * noise.next());
+        AllanPoint {
+            tau_s: tau,
+            deviation,
+            lower: deviation / (1.0 + 1.2 * relative),
+            upper: deviation * (1.0 + 2.2 * relative),
+            noise: if tau < 20.0 {
+                "white"
+            } else if tau < 70.0 {
+                "flicker"
+            } else {
+                "random walk"
+            }
+            .into(),
+        }
+    });
+    let curve = |label: &str, f: &dyn Fn(f64) -> f64| Curve {
+        label: label.into(),
+        points: taus.iter().map(|&t| (t, f(t))).collect(),
+    };
+    Allan {
+        title: format!("{axis}: overlapping Allan deviation"),
+        quantity: "Allan deviation".into(),
+        unit: "deg/s".into(),
+        points: points.collect(),
+        total: Some(curve("fitted sum", &|t| components(t).0.hypot(components(t).1))),
+        components: vec![
+            curve("white noise", &|t| components(t).0),
+            curve("Gauss-Markov, 194 s", &|t| components(t).1),
+        ],
+    }
+}
+
+fn sigma_data() -> Sigma {
+    let time_s: Vec<f64> = (0..120).map(|i| 0.01 * 10f64.powf(f64::from(i) / 22.0)).collect();
+    let fall =
+        |start: f64, end: f64| time_s.iter().map(|t| (end * end + start * start / (1.0 + 30.0 * t)).sqrt()).collect();
+    Sigma {
+        title: "gyro_x: predicted standard deviation".into(),
+        unit: "deg/s".into(),
+        states: vec![
+            SigmaState { name: "bias".into(), sigma: fall(0.5, 0.0041), steady: None },
+            SigmaState { name: "gauss_markov".into(), sigma: fall(0.028, 0.0087), steady: Some(0.0087) },
+            SigmaState { name: "gauss_markov.2".into(), sigma: fall(0.011, 0.0052), steady: Some(0.0052) },
+        ],
+        settling_time_s: Some(19.6),
+        time_s,
+    }
+}
+
+fn budget_data() -> Vec<BudgetItem> {
+    [
+        ("white noise", 0.503, "0.00617 deg/s"),
+        ("Gauss-Markov drift (Tc = 193.9 s)", 0.4961, "0.00612 deg/s"),
+        ("turn-on bias", 0.0004, "0.00017 deg/s"),
+    ]
+    .map(|(source, share, value)| BudgetItem { source: source.into(), share, value: value.into() })
+    .to_vec()
+}
+
+fn estimate_data() -> Estimate {
+    let mut noise = Normals(5);
+    let (mut truth, mut error) = (0.1, 0.05);
+    let mut data = Estimate {
+        title: "gyro_x: bias estimate".into(),
+        quantity: "bias".into(),
+        unit: "deg/s".into(),
+        truth: Some(Curve { label: "truth".into(), points: vec![] }),
+        ..Estimate::default()
+    };
+    for i in 0..900 {
+        let t = f64::from(i) * 8.0;
+        truth = 0.1 + (truth - 0.1) * 0.96 + 0.008 * noise.next();
+        error = error * 0.7 + 0.005 * noise.next();
+        data.time_s.push(t);
+        data.estimate.push(truth + error);
+        data.sigma.push((0.007_f64.powi(2) + 0.25 / (1.0 + 200.0 * t)).sqrt());
+        data.truth.as_mut().unwrap().points.push((t, truth));
+    }
+    data
+}
+
+fn innovation_data() -> Innovations {
+    let mut noise = Normals(6);
+    let extremes = |noise: &mut Normals| {
+        noise.take(400).into_iter().fold((0.0_f64, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)))
+    };
+    let mut data = Innovations { title: "gyro_x: normalised innovations".into(), ..Innovations::default() };
+    for i in 0..600 {
+        let (low, high) = extremes(&mut noise);
+        data.time_s.push(f64::from(i) * 12.0);
+        data.lower.push(low);
+        data.upper.push(high);
+    }
+    data
+}
+
+fn correlation_data() -> Autocorrelation {
+    let mut noise = Normals(7);
+    Autocorrelation {
+        title: "gyro_x: autocorrelation of innovations".into(),
+        points: (1..=40)
+            .map(|lag| (f64::from(lag), 0.0023 * noise.next() + 0.012 * (-f64::from(lag) / 2.0).exp()))
+            .collect(),
+        bound: 0.0046,
+        bound_label: "95 % for white".into(),
+    }
+}
+
+fn histogram_data() -> Histogram {
+    let edges: Vec<f64> = (0..=24).map(|i| f64::from(i) * 0.75).collect();
+    let expected: Vec<f64> = edges.windows(2).map(|e| 0.62 * (-0.5 * e[0]).exp() / (1.0 + 0.4 * e[0])).collect();
+    let observed = expected.iter().enumerate().map(|(i, p)| p * (1.0 + 0.02 * i as f64)).collect();
+    Histogram {
+        title: "gyro_x: normalised innovation squared".into(), edges, observed, expected, law: "χ²(1)".into()
+    }
+}
+
+fn periodogram_data() -> Periodogram {
+    let mut noise = Normals(8);
+    let powers: Vec<f64> = (0..300).map(|_| noise.next().powi(2) + noise.next().powi(2)).collect();
+    let total: f64 = powers.iter().sum();
+    let mut sum = 0.0;
+    let points = powers.iter().enumerate().map(|(i, p)| {
+        sum += p / total;
+        ((i + 1) as f64 * 0.000_2, sum)
+    });
+    Periodogram {
+        title: "gyro_x: low-frequency cumulative periodogram".into(),
+        points: points.collect(),
+        half_width: 1.358 / 300f64.sqrt(),
+        band_label: "95 % band".into(),
+    }
+}
+
+fn nees_data() -> Nees {
+    let mut noise = Normals(9);
+    let mut level = 0.0;
+    let nees = (0..500).map(|_| {
+        level = 0.95 * level + 0.08 * noise.next();
+        2.0 + level
+    });
+    Nees {
+        title: "gyro_x: NEES over 50 runs".into(),
+        nees: nees.collect(),
+        time_s: (0..500).map(|i| f64::from(i) * 1.2).collect(),
+        lower: 1.484,
+        upper: 2.591,
+        expected: 2.0,
+        band_label: "95 % at one time".into(),
+    }
+}
+
+fn gallery() -> Vec<(&'static str, String)> {
+    vec![
+        ("allan", allan(&allan_data("gyro_x", 1))),
+        ("sigma", sigma(&sigma_data())),
+        ("budget", error_budget("gyro_x: error budget of the bias estimate", &budget_data())),
+        ("estimate", estimate(&estimate_data())),
+        ("innovations", innovations(&innovation_data())),
+        ("autocorrelation", autocorrelation(&correlation_data())),
+        ("nis", nis_histogram(&histogram_data())),
+        ("periodogram", cumulative_periodogram(&periodogram_data())),
+        ("nees", nees(&nees_data())),
+    ]
+}
+
+fn page() -> Page {
+    let figures = |names: &[&str]| {
+        gallery()
+            .into_iter()
+            .filter(|f| names.contains(&f.0))
+            .map(|(name, svg)| (svg, format!("What {name} says.")))
+            .collect()
+    };
+    Page {
+        title: "Replay of rest.csv".into(),
+        subtitle: "Filter design skydog.json, three gyro axes at 100 Hz".into(),
+        badge: Some(Badge::new(Verdict::Consistent, "No test rejects at the family-wise level 0.01 (Holm, 9 tests).")),
+        provenance: vec![
+            ("log".into(), "rest.csv, 720 000 samples, 7200 s, sha256 9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08".into()),
+            ("version".into(), "0.1.0".into()),
+        ],
+        sections: vec![
+            Section::new("Verdict per axis")
+                .paragraph("The innovations of a true filter are white with the predicted variance.")
+                .table(
+                    "Tests",
+                    &["axis", "test", "statistic", "lower", "upper", "p", "adjusted p", "meaning"],
+                    ["gyro_x", "gyro_y", "gyro_z"].iter().map(|a| ["", "nis", "1.0002", "0.9967", "1.0033", "0.887", "1.000", "Mean NIS is what the filter predicts, so R is right."].iter().enumerate().map(|(i, c)| if i == 0 { (*a).to_owned() } else { (*c).to_owned() }).collect()).collect(),
+                )
+                .warning("A gap of 2.4 s at 1312 s was propagated over."),
+            Section::new("gyro_x").figures(figures(&["estimate", "innovations", "autocorrelation", "nis", "periodogram"])),
+            Section::new("Design").figures(figures(&["allan", "sigma", "budget", "nees"])).list(vec!["One sentence.".into(), "Another sentence.".into()]),
+        ],
+    }
+}
+
+fn save(name: &str, content: &str) {
+    if let Some(dir) = std::env::var_os("KFDESIGN_GALLERY") {
+        std::fs::write(std::path::Path::new(&dir).join(name), content).unwrap();
+    }
+}
+
+#[test]
+fn figures_are_self_contained_and_accessible() {
+    for (name, svg) in gallery() {
+        save(&format!("{name}.svg"), &svg);
+        assert!(svg.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\""), "{name}");
+        assert!(svg.contains("role=\"img\"") && svg.contains("<title>") && svg.contains("<desc>"), "{name}");
+        assert!(svg.contains("prefers-color-scheme:dark"), "{name}");
+        // no colour and no type outside the style sheet, nothing fetched
+        let (_, body) = svg.split_once("</style>").unwrap();
+        for alien in ["#", "font-family", "opacity=", "href", "url(", "NaN", "inf"] {
+            assert!(!body.contains(alien), "{name}: {alien}");
+        }
+    }
+    save("sheet.svg", &sheet("rest.csv", &[allan(&allan_data("gyro_x", 1)), allan(&allan_data("gyro_y", 2))]));
+}
+
+#[test]
+fn page_is_self_contained() {
+    let html = page().to_html().unwrap();
+    save("page.html", &html);
+    for alien in ["<script", "<link", "@import", "url(", "src=", "href="] {
+        assert!(!html.contains(alien), "{alien}");
+    }
+    assert_eq!(html.matches("<svg ").count(), 9);
+    assert!(html.contains("<b>consistent</b>"));
+}

@@ -1,0 +1,151 @@
+//! What tells whether a filter's covariance is true: autocorrelation, NIS histogram, cumulative periodogram, NEES.
+
+use super::chart::{Axis, Chart};
+use super::scale::Scale;
+use super::style::Class;
+use super::trace::Clock;
+
+/// Autocorrelation of the normalised innovations at lags 1, 2, …
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Autocorrelation {
+    pub title: String,
+    /// Lag in samples and value.
+    pub points: Vec<(f64, f64)>,
+    /// The limit for one lag of white innovations, for instance 1.96/√n.
+    pub bound: f64,
+    /// "95 % for white innovations".
+    pub bound_label: String,
+}
+
+/// Stems with the bound.
+pub fn autocorrelation(data: &Autocorrelation) -> String {
+    let largest = data.points.iter().map(|p| p.1.abs()).filter(|v| v.is_finite()).fold(data.bound.abs(), f64::max);
+    let limit = if largest.is_finite() && largest > 0.0 { 1.25 * largest } else { 1.0 };
+    let last = data.points.iter().map(|p| p.0).fold(1.0, f64::max);
+    let mut chart = Chart::new(
+        &data.title,
+        &format!(
+            "Autocorrelation of the normalised innovations; largest magnitude {largest:.4}, bound {:.4}.",
+            data.bound
+        ),
+        Axis { name: "lag".into(), unit: "samples".into(), scale: Scale::linear_between(0.0, last + 1.0, 6.0) },
+        Axis { name: "autocorrelation".into(), unit: String::new(), scale: Scale::linear_between(-limit, limit, 6.0) },
+    );
+    chart.plot_height(170);
+    chart.level(Class::Axis, 0.0);
+    chart.level(Class::Bound, data.bound);
+    chart.level(Class::Bound, -data.bound);
+    chart.stems(0, data.points.clone());
+    chart.legend_dots(0, "innovations");
+    chart.legend_line(Class::Bound, &data.bound_label);
+    chart.render()
+}
+
+/// Histogram of the normalised innovation squared beside its law.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Histogram {
+    pub title: String,
+    /// n + 1 edges.
+    pub edges: Vec<f64>,
+    /// Fraction of the samples in each of the n bins.
+    pub observed: Vec<f64>,
+    /// Probability of each bin under the stated law.
+    pub expected: Vec<f64>,
+    /// "χ²(1)".
+    pub law: String,
+}
+
+/// Bars against the expected step line, probability on a logarithmic axis so that the tail shows.
+pub fn nis_histogram(data: &Histogram) -> String {
+    let bins: Vec<(f64, f64)> = data.edges.iter().copied().zip(data.edges.iter().copied().skip(1)).collect();
+    let values = data.observed.iter().chain(&data.expected).copied();
+    let mut chart = Chart::new(
+        &data.title,
+        &format!("Histogram of the normalised innovation squared against the {} law.", data.law),
+        Axis {
+            name: "normalised innovation squared".into(),
+            unit: String::new(),
+            scale: Scale::linear(data.edges.iter().copied(), &[0.0]),
+        },
+        Axis { name: "fraction per bin".into(), unit: String::new(), scale: Scale::log(values) },
+    );
+    chart.bars(bins.iter().zip(&data.observed).map(|(&(left, right), &share)| (left, right, share)).collect());
+    let steps = bins.iter().zip(&data.expected).flat_map(|(&(left, right), &p)| [(left, p), (right, p)]);
+    chart.line(Class::Line(1), steps.collect());
+    chart.legend_bar("observed");
+    chart.legend_line(Class::Line(1), &data.law);
+    chart.render()
+}
+
+/// Cumulative periodogram of the innovations (Bartlett 1955), fractions 0..=1.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Periodogram {
+    pub title: String,
+    /// (frequency in Hz, cumulative fraction of the power).
+    pub points: Vec<(f64, f64)>,
+    /// Half width of the Kolmogorov band, for instance 1.358/√m.
+    pub half_width: f64,
+    /// "95 % band (Kolmogorov)".
+    pub band_label: String,
+}
+
+/// Cumulative periodogram with the straight line of white noise and its band.
+pub fn cumulative_periodogram(data: &Periodogram) -> String {
+    let highest = data.points.iter().map(|p| p.0).filter(|f| f.is_finite()).fold(0.0, f64::max);
+    let end = if highest > 0.0 { highest } else { 1.0 };
+    let mut chart = Chart::new(
+        &data.title,
+        &format!("Cumulative periodogram up to {highest:.3e} Hz with a band of half width {:.4}.", data.half_width),
+        Axis { name: "frequency".into(), unit: "Hz".into(), scale: Scale::linear_between(0.0, end, 6.0) },
+        Axis { name: "cumulative power".into(), unit: "fraction".into(), scale: Scale::linear_between(0.0, 1.0, 5.0) },
+    );
+    let w = data.half_width;
+    chart.band(5, vec![(0.0, -w, w), (end, 1.0 - w, 1.0 + w)]);
+    chart.line(Class::Expected, vec![(0.0, 0.0), (end, 1.0)]);
+    chart.line(Class::Line(0), data.points.clone());
+    chart.legend_line(Class::Line(0), "innovations");
+    chart.legend_line(Class::Expected, "white");
+    chart.legend_band(5, &data.band_label);
+    chart.render()
+}
+
+/// NEES averaged over runs, against time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Nees {
+    pub title: String,
+    pub time_s: Vec<f64>,
+    pub nees: Vec<f64>,
+    /// Pointwise bounds.
+    pub lower: f64,
+    pub upper: f64,
+    /// Number of states.
+    pub expected: f64,
+    /// "95 % at one time".
+    pub band_label: String,
+}
+
+/// Average NEES with its pointwise band.
+pub fn nees(data: &Nees) -> String {
+    let clock = Clock::covering(&data.time_s);
+    let mut chart = Chart::new(
+        &data.title,
+        &format!(
+            "Average NEES over time; expected {:.3}, pointwise bounds {:.3} to {:.3}.",
+            data.expected, data.lower, data.upper
+        ),
+        clock.axis(),
+        Axis {
+            name: "average NEES".into(),
+            unit: String::new(),
+            scale: Scale::linear_padded(data.nees.iter().copied(), &[data.lower, data.upper]),
+        },
+    );
+    let ends = [data.time_s.first(), data.time_s.last()];
+    chart.band(5, ends.into_iter().flatten().map(|&t| (clock.show(t), data.lower, data.upper)).collect());
+    chart.level(Class::Expected, data.expected);
+    chart.line(Class::Line(0), data.time_s.iter().zip(&data.nees).map(|(&t, &v)| (clock.show(t), v)).collect());
+    chart.legend_line(Class::Line(0), "average over runs");
+    chart.legend_line(Class::Expected, "expected");
+    chart.legend_band(5, &data.band_label);
+    chart.render()
+}

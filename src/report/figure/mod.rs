@@ -1,0 +1,30 @@
+//! Figures as self-contained SVG: plain data in, one string out.
+//!
+//! Text stays text in generic fonts, colours follow the reader's light or dark setting, series differ by line style as well as by colour,
+//! and the same data give the same bytes. Values that are not finite, or not positive on a logarithmic axis, leave a gap.
+
+mod allan;
+mod budget;
+mod chart;
+mod consistency;
+mod scale;
+mod sheet;
+mod style;
+mod trace;
+
+pub use allan::{Allan, AllanPoint, allan};
+pub use budget::{BudgetItem, error_budget};
+pub use consistency::{
+    Autocorrelation, Histogram, Nees, Periodogram, autocorrelation, cumulative_periodogram, nees, nis_histogram,
+};
+pub use sheet::sheet;
+pub use style::style_sheet;
+pub use trace::{Estimate, Innovations, Sigma, SigmaState, estimate, innovations, sigma};
+
+/// A named line.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Curve {
+    pub label: String,
+    /// (x, y).
+    pub points: Vec<(f64, f64)>,
+}

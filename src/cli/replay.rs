@@ -1,12 +1,243 @@
 //! `kfdesign replay`.
 
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+
 use super::Status;
+use super::log_flags::{LogFlags, print_check};
+use super::output::{digits, print_json, print_text, progress, table};
+use crate::consistency::{Test, Verdict};
+use crate::export::atomic::refuse_input_as_output;
+use crate::export::table::TableWriter;
+use crate::filter::FilterDesign;
+use crate::input::{Block, LogReader};
+use crate::replay::{Estimates, LogShape, Options, ReplayResult, Replayer};
+use crate::units::{Quantity, Unit};
 
 /// A recorded log through filter.json, with a verdict
+///
+/// Exit status 1 only when the verdict is inconsistent. Inconclusive (a log too short to judge the drift) is no failed
+/// check: it exits 0 and says so.
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+#[command(after_help = "Example: kfdesign replay filter.json log.csv -o estimates.csv --innovations")]
+pub struct Args {
+    /// The design, as written by `tune`
+    filter: PathBuf,
+    /// The log: text, .gz or .npy
+    log: PathBuf,
+    /// Estimates with their sigmas, SI units: .csv, .csv.gz or .npy
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Add innovation, its sigma and NIS to the output
+    #[arg(long, requires = "output")]
+    innovations: bool,
+    /// Probability of a false alarm, over all tests together
+    #[arg(long, default_value_t = 0.01, value_name = "P")]
+    alpha: f64,
+    /// Reject samples whose innovation is further out than this many sigmas
+    #[arg(long, value_name = "SIGMAS")]
+    gate: Option<f64>,
+    /// One JSON document on stdout
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    reading: LogFlags,
+}
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
-    let _ = args;
-    todo!()
+    let design = FilterDesign::read(&args.filter)?;
+    for output in args.outputs() {
+        refuse_input_as_output(output, &args.log)?;
+        refuse_input_as_output(output, &args.filter)?;
+    }
+    let mut reader = LogReader::open(&args.log, &args.reading.options()?)?;
+    let name = args.log.display().to_string();
+    print_check(&name, reader.check());
+    let shape = LogShape {
+        axes: reader.axes().iter().map(|a| a.name.clone()).collect(),
+        quantity: reader.quantity(),
+        sample_rate_hz: reader.check().sample_rate_hz,
+    };
+    let options = Options { alpha: args.alpha, gate: args.gate };
+    let replayer = Replayer::new(&design, &shape, options).with_context(|| name.clone())?;
+    say_assignment(&design, &replayer, &shape);
+    let mut result = stream(args, &design, replayer, &mut reader)?;
+    result.log = Some(name);
+    result.log_sha256 = Some(reader.sha256().to_string());
+    if args.json {
+        print_json(&result)?;
+    } else {
+        let unit = reader.axes().first().map(|a| a.unit.clone());
+        print_text(&text(&result, unit.as_ref()))?;
+    }
+    Ok(match result.verdict {
+        Verdict::Inconsistent => Status::CheckFailed,
+        Verdict::Consistent | Verdict::Inconclusive => Status::Done,
+    })
+}
+
+impl Args {
+    fn outputs(&self) -> impl Iterator<Item = &Path> {
+        [&self.output].into_iter().flatten().map(PathBuf::as_path)
+    }
+}
+
+/// One line on stderr when names had to be matched or axes are left out.
+fn say_assignment(design: &FilterDesign, replayer: &Replayer, log: &LogShape) {
+    let pairs: Vec<String> = design
+        .axes
+        .iter()
+        .zip(replayer.log_axes())
+        .filter(|(axis, found)| axis.name != **found)
+        .map(|(axis, found)| format!("{found} goes through {}", axis.name))
+        .collect();
+    let left_out: Vec<&str> =
+        log.axes.iter().filter(|a| !replayer.log_axes().contains(a)).map(String::as_str).collect();
+    if !pairs.is_empty() {
+        eprintln!("  note: {}", pairs.join(", "));
+    }
+    if !left_out.is_empty() {
+        eprintln!("  note: not in the filter, left out: {}", left_out.join(", "));
+    }
+}
+
+/// Block after block through the filter and, if asked, into the output file.
+fn stream(
+    args: &Args,
+    design: &FilterDesign,
+    mut replayer: Replayer,
+    reader: &mut LogReader,
+) -> anyhow::Result<ReplayResult> {
+    let mut writer = match &args.output {
+        Some(path) => Some(TableWriter::create(path, &header(design, args.innovations))?),
+        None => None,
+    };
+    let bar = progress(reader.check().samples, "replay");
+    let (mut block, mut estimates) = (Block::default(), Estimates::default());
+    while reader.next_block(&mut block)? {
+        replayer.push(&block, writer.is_some().then_some(&mut estimates));
+        if let Some(writer) = &mut writer {
+            writer.write(&columns(&estimates, args.innovations))?;
+        }
+        bar.inc(block.time_s.len() as u64);
+    }
+    bar.finish_and_clear();
+    let result = replayer.finish();
+    if let Some(writer) = writer {
+        writer.finish()?;
+    }
+    Ok(result)
+}
+
+fn header(design: &FilterDesign, innovations: bool) -> Vec<String> {
+    let mut names = vec!["time (s)".to_string()];
+    let unit = design.quantity.si_unit();
+    for axis in &design.axes {
+        for state in &axis.model.states {
+            names.push(format!("{}_{} ({})", axis.name, state.name, state.unit));
+            names.push(format!("{}_{}_sigma ({})", axis.name, state.name, state.unit));
+        }
+        if innovations {
+            names.push(format!("{}_innovation ({unit})", axis.name));
+            names.push(format!("{}_innovation_sigma ({unit})", axis.name));
+            names.push(format!("{}_nis", axis.name));
+        }
+    }
+    names
+}
+
+fn columns(estimates: &Estimates, innovations: bool) -> Vec<&[f64]> {
+    let mut columns = vec![estimates.time_s.as_slice()];
+    for axis in &estimates.axes {
+        for (state, sigma) in axis.states.iter().zip(&axis.sigmas) {
+            columns.extend([state.as_slice(), sigma.as_slice()]);
+        }
+        if innovations {
+            columns.extend([axis.innovation.as_slice(), axis.innovation_sigma.as_slice(), axis.nis.as_slice()]);
+        }
+    }
+    columns
+}
+
+/// Everything a person wants to see.
+fn text(result: &ReplayResult, unit: Option<&Unit>) -> String {
+    let mut out = String::new();
+    out.push_str(&table(
+        &["axis", "log column", "samples", "accepted", "gaps", "missing", "unusable", "rejected", "log-likelihood"],
+        &result
+            .axes
+            .iter()
+            .map(|a| {
+                vec![
+                    a.name.clone(),
+                    a.log_axis.clone(),
+                    a.samples.to_string(),
+                    a.accepted.to_string(),
+                    a.gaps.to_string(),
+                    a.missing.to_string(),
+                    a.unusable.to_string(),
+                    a.rejected.to_string(),
+                    format!("{:.3}", a.log_likelihood),
+                ]
+            })
+            .collect::<Vec<_>>(),
+    ));
+    out.push_str("\nEstimates at the end of the log, with the filter's own sigma:\n");
+    out.push_str(&table(&["axis", "state", "estimate", "sigma", "unit"], &state_rows(result, unit)));
+    out.push_str(&format!(
+        "\nTests of the innovations, bounds at {} % (each alone), p-values adjusted for all {} tests (Holm):\n",
+        digits(100.0 * (1.0 - result.alpha)),
+        result.tests.len()
+    ));
+    out.push_str(&table(
+        &["axis", "test", "statistic", "lower", "upper", "p", "effect", "interval", "tolerated", "result"],
+        &result.tests.iter().map(|t| test_row(t, result.alpha)).collect::<Vec<_>>(),
+    ));
+    out.push_str(&format!("\n{}: {}\n", result.verdict.word(), result.meaning));
+    out
+}
+
+fn state_rows(result: &ReplayResult, unit: Option<&Unit>) -> Vec<Vec<String>> {
+    let mut rows = Vec::new();
+    for axis in &result.axes {
+        for state in &axis.final_state {
+            let (value, sigma, shown) = in_log_unit(state.value, state.sigma, &state.unit, result.quantity, unit);
+            rows.push(vec![axis.name.clone(), state.name.clone(), digits(value), digits(sigma), shown]);
+        }
+    }
+    rows
+}
+
+/// States of the measured quantity are shown in the log's unit, others as they are.
+fn in_log_unit(value: f64, sigma: f64, si: &str, quantity: Quantity, log: Option<&Unit>) -> (f64, f64, String) {
+    match log.filter(|u| si == quantity.si_unit() && u.dimension() == quantity.dimension()) {
+        Some(unit) => (unit.from_si(value), unit.from_si(sigma), unit.to_string()),
+        None => (value, sigma, si.to_string()),
+    }
+}
+
+fn test_row(test: &Test, alpha: f64) -> Vec<String> {
+    let range = |r: [f64; 2]| format!("{} … {}", digits(r[0]), digits(r[1]));
+    let (value, interval, tolerance) = test.effect.as_ref().map_or_else(
+        || ("-".to_string(), "-".to_string(), "-".to_string()),
+        |e| (digits(e.value), range(e.interval), range(e.tolerance)),
+    );
+    let result = match (test.pass, test.adjusted_p_value < alpha) {
+        (true, false) => "pass",
+        (true, true) => "small",
+        (false, _) => "FAIL",
+    };
+    vec![
+        test.axis.clone(),
+        test.averaging_s.map_or_else(|| test.name.clone(), |s| format!("{} {} s", test.name, digits(s))),
+        digits(test.statistic),
+        digits(test.lower),
+        digits(test.upper),
+        digits(test.adjusted_p_value),
+        value,
+        interval,
+        tolerance,
+        result.to_string(),
+    ]
 }

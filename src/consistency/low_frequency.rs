@@ -210,14 +210,14 @@ impl BlockResult {
         } else {
             format!("averaged over {seconds:.4} s the innovations have the predicted power")
         };
-        Test::new(axis, "low_frequency", self.ratio, [self.lower, self.upper], self.p_value, meaning).with_effect(
-            Effect::new(
+        Test::new(axis, "low_frequency", self.ratio, [self.lower, self.upper], self.p_value, meaning)
+            .with_averaging(seconds)
+            .with_effect(Effect::new(
                 "variance_ratio",
                 self.ratio,
                 self.interval,
                 [1.0 / VARIANCE_RATIO_TOLERANCE, VARIANCE_RATIO_TOLERANCE],
-            ),
-        )
+            ))
     }
 }
 

@@ -56,6 +56,9 @@ pub struct Test {
     pub pass: bool,
     /// A sentence.
     pub meaning: String,
+    /// Averaging time of a low-frequency test, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub averaging_s: Option<f64>,
     /// How large the deviation is, where it can be said; judged on measured logs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub effect: Option<Effect>,
@@ -75,8 +78,15 @@ impl Test {
             adjusted_p_value: p_value,
             pass: true,
             meaning,
+            averaging_s: None,
             effect: None,
         }
+    }
+
+    #[must_use]
+    pub fn with_averaging(mut self, seconds: f64) -> Test {
+        self.averaging_s = Some(seconds);
+        self
     }
 
     #[must_use]

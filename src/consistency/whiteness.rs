@@ -357,6 +357,7 @@ impl CumulativePeriodogram {
         };
         let size = self.distance.abs();
         Test::new(axis, "cumulative_periodogram", self.distance, [-self.bound, self.bound], self.p_value, meaning)
+            .with_averaging(interval_s)
             .with_effect(Effect::new(
                 "periodogram_distance",
                 size,

@@ -202,7 +202,11 @@ pub struct ReplayResult {
     pub verdict: Verdict,
     /// The verdict in words.
     pub meaning: String,
+    /// Family-wise false-alarm probability.
     pub alpha: f64,
+    /// File name and SHA-256 of the log, if it came from a file.
+    pub log: Option<String>,
+    pub log_sha256: Option<String>,
     pub gate: Option<f64>,
     pub quantity: Quantity,
     pub sample_rate: f64,

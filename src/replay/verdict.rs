@@ -41,6 +41,8 @@ pub(super) fn conclude(replayer: Replayer) -> ReplayResult {
         verdict,
         meaning: meaning(verdict, options.alpha, &tests, &results, &short),
         alpha: options.alpha,
+        log: None,
+        log_sha256: None,
         gate: options.gate,
         quantity: design.quantity,
         sample_rate: design.sample_rate_hz,

@@ -1,5 +1,7 @@
 //! `kfdesign replay`.
 
+mod sight;
+
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
@@ -8,11 +10,11 @@ use super::Status;
 use super::log_flags::{LogFlags, print_check};
 use super::output::{digits, print_json, print_text, progress, table};
 use crate::consistency::{Test, Verdict};
-use crate::export::atomic::refuse_input_as_output;
+use crate::export::atomic::{self, refuse_input_as_output};
 use crate::export::table::TableWriter;
 use crate::filter::FilterDesign;
 use crate::input::{Block, LogReader};
-use crate::replay::{Estimates, LogShape, Options, ReplayResult, Replayer};
+use crate::replay::{AxisResult, Estimates, LogShape, Options, ReplayResult, Replayer};
 use crate::units::{Quantity, Unit};
 
 /// A recorded log through filter.json, with a verdict
@@ -38,6 +40,12 @@ pub struct Args {
     /// Reject samples whose innovation is further out than this many sigmas
     #[arg(long, value_name = "SIGMAS")]
     gate: Option<f64>,
+    /// One HTML page with tables and figures
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
+    /// Figures of every axis
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
     /// One JSON document on stdout
     #[arg(long)]
     json: bool,
@@ -65,10 +73,17 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let mut result = stream(args, &design, replayer, &mut reader)?;
     result.log = Some(name);
     result.log_sha256 = Some(reader.sha256().to_string());
+    let unit = reader.axes().first().map(|a| a.unit.clone());
+    if let Some(path) = &args.plot {
+        atomic::write(path, sight::sheet(&result, unit.as_ref()).as_bytes())?;
+    }
+    if let Some(path) = &args.report {
+        let page = sight::page(&result, &args.filter.display().to_string(), unit.as_ref());
+        atomic::write(path, page.to_html()?.as_bytes())?;
+    }
     if args.json {
         print_json(&result)?;
     } else {
-        let unit = reader.axes().first().map(|a| a.unit.clone());
         print_text(&text(&result, unit.as_ref()))?;
     }
     Ok(match result.verdict {
@@ -79,7 +94,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
 
 impl Args {
     fn outputs(&self) -> impl Iterator<Item = &Path> {
-        [&self.output].into_iter().flatten().map(PathBuf::as_path)
+        [&self.output, &self.report, &self.plot].into_iter().flatten().map(PathBuf::as_path)
     }
 }
 
@@ -160,42 +175,49 @@ fn columns(estimates: &Estimates, innovations: bool) -> Vec<&[f64]> {
     columns
 }
 
+const COUNTS: [&str; 9] =
+    ["axis", "log column", "samples", "accepted", "gaps", "missing", "unusable", "rejected", "log-likelihood"];
+const STATES: [&str; 5] = ["axis", "state", "estimate", "sigma", "unit"];
+const TESTS: [&str; 10] =
+    ["axis", "test", "statistic", "lower", "upper", "p", "effect", "interval", "tolerated", "result"];
+
 /// Everything a person wants to see.
 fn text(result: &ReplayResult, unit: Option<&Unit>) -> String {
-    let mut out = String::new();
-    out.push_str(&table(
-        &["axis", "log column", "samples", "accepted", "gaps", "missing", "unusable", "rejected", "log-likelihood"],
-        &result
-            .axes
-            .iter()
-            .map(|a| {
-                vec![
-                    a.name.clone(),
-                    a.log_axis.clone(),
-                    a.samples.to_string(),
-                    a.accepted.to_string(),
-                    a.gaps.to_string(),
-                    a.missing.to_string(),
-                    a.unusable.to_string(),
-                    a.rejected.to_string(),
-                    format!("{:.3}", a.log_likelihood),
-                ]
-            })
-            .collect::<Vec<_>>(),
-    ));
-    out.push_str("\nEstimates at the end of the log, with the filter's own sigma:\n");
-    out.push_str(&table(&["axis", "state", "estimate", "sigma", "unit"], &state_rows(result, unit)));
-    out.push_str(&format!(
-        "\nTests of the innovations, bounds at {} % (each alone), p-values adjusted for all {} tests (Holm):\n",
+    let states = table(&STATES, &state_rows(result, unit));
+    let tests = if result.tests.is_empty() {
+        "\nToo few samples for any test.\n".to_string()
+    } else {
+        format!("\n{}:\n{}", tests_caption(result), table(&TESTS, &test_rows(result)))
+    };
+    format!(
+        "{}\nEstimates at the end of the log, with the filter's own sigma:\n{states}{tests}\n{}: {}\n",
+        table(&COUNTS, &count_rows(result)),
+        result.verdict.word(),
+        result.meaning
+    )
+}
+
+fn tests_caption(result: &ReplayResult) -> String {
+    format!(
+        "Tests of the innovations: bounds at {} %, each alone; p adjusted for all {} tests (Holm)",
         digits(100.0 * (1.0 - result.alpha)),
         result.tests.len()
-    ));
-    out.push_str(&table(
-        &["axis", "test", "statistic", "lower", "upper", "p", "effect", "interval", "tolerated", "result"],
-        &result.tests.iter().map(|t| test_row(t, result.alpha)).collect::<Vec<_>>(),
-    ));
-    out.push_str(&format!("\n{}: {}\n", result.verdict.word(), result.meaning));
-    out
+    )
+}
+
+fn count_rows(result: &ReplayResult) -> Vec<Vec<String>> {
+    let row = |a: &AxisResult| {
+        let counts = [a.samples, a.accepted, a.gaps, a.missing, a.unusable, a.rejected].map(|n| n.to_string());
+        let mut row = vec![a.name.clone(), a.log_axis.clone()];
+        row.extend(counts);
+        row.push(format!("{:.3}", a.log_likelihood));
+        row
+    };
+    result.axes.iter().map(row).collect()
+}
+
+fn test_rows(result: &ReplayResult) -> Vec<Vec<String>> {
+    result.tests.iter().map(|t| test_row(t, result.alpha)).collect()
 }
 
 fn state_rows(result: &ReplayResult, unit: Option<&Unit>) -> Vec<Vec<String>> {

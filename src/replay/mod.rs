@@ -25,6 +25,8 @@ pub use trace::{Point, Trace};
 
 /// Number of autocorrelation lags that are tested.
 pub const LAGS: usize = 50;
+/// Bins of the NIS histogram, each half a unit wide.
+const NIS_BINS: usize = 40;
 
 /// How to replay.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -182,16 +184,24 @@ pub struct AxisResult {
     pub start: Option<Start>,
     /// For figures; not part of the document.
     #[serde(skip)]
-    #[schemars(skip)]
+    pub sight: Sight,
+}
+
+/// What figures of one axis show.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sight {
     pub trace: Vec<Point>,
-    /// Lags 1, 2, …; for figures.
-    #[serde(skip)]
-    #[schemars(skip)]
+    pub samples_per_point: u64,
+    /// Lags 1, 2, …
     pub autocorrelation: Vec<f64>,
-    /// Frequency in Hz and share of the power up to it, of the block-averaged innovations; for figures.
-    #[serde(skip)]
-    #[schemars(skip)]
+    /// Bound of one autocorrelation at level alpha.
+    pub autocorrelation_bound: f64,
+    /// Frequency in Hz and share of the power up to it, of the block-averaged innovations.
     pub cumulative_periodogram: Vec<(f64, f64)>,
+    /// Bound of its distance from the straight line at level alpha.
+    pub periodogram_bound: f64,
+    /// Accepted samples with ν²/S in [i/2, (i+1)/2); the last bin has all above.
+    pub nis_histogram: Vec<u64>,
 }
 
 /// The whole replay.
@@ -234,6 +244,7 @@ struct AxisReplay {
     missing: u64,
     rejected: u64,
     trace: Trace,
+    nis_histogram: [u64; NIS_BINS],
 }
 
 /// The score test of x0: a second filter, shifted at the start by one standard deviation of P0 in the direction that the first
@@ -332,6 +343,7 @@ impl AxisReplay {
             missing: 0,
             rejected: 0,
             trace: Trace::new(),
+            nis_histogram: [0; NIS_BINS],
         }
     }
 
@@ -367,6 +379,7 @@ impl AxisReplay {
         self.low_frequency.push(y);
         let (estimate, sigma) = self.output();
         self.trace.push(time_s, z, estimate, sigma, y);
+        self.nis_histogram[((2.0 * update.nis) as usize).min(NIS_BINS - 1)] += 1;
         Some(update)
     }
 

@@ -3,7 +3,7 @@
 const MOST_POINTS: usize = 2000;
 
 /// One point: means over its samples.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
     /// s from the start of the log.
     pub time_s: f64,
@@ -15,7 +15,20 @@ pub struct Point {
     pub sigma: f64,
     /// Normalised innovation, averaged and multiplied by √(samples of the point): N(0, 1) when the design is true.
     pub innovation: f64,
+    /// Extremes of the normalised innovations.
+    pub lowest: f64,
+    pub highest: f64,
 }
+
+const EMPTY: Point = Point {
+    time_s: 0.0,
+    measured: 0.0,
+    estimate: 0.0,
+    sigma: 0.0,
+    innovation: 0.0,
+    lowest: f64::INFINITY,
+    highest: f64::NEG_INFINITY,
+};
 
 /// Points that are merged in pairs, and cover twice as many samples each, whenever there are too many.
 #[derive(Clone, Debug)]
@@ -28,7 +41,7 @@ pub struct Trace {
 
 impl Trace {
     pub(super) fn new() -> Trace {
-        Trace { per_point: 1, filled: 0, sum: Point::default(), points: Vec::with_capacity(MOST_POINTS) }
+        Trace { per_point: 1, filled: 0, sum: EMPTY, points: Vec::with_capacity(MOST_POINTS) }
     }
 
     pub(super) fn push(&mut self, time_s: f64, measured: f64, estimate: f64, sigma: f64, innovation: f64) {
@@ -37,6 +50,8 @@ impl Trace {
         self.sum.estimate += estimate;
         self.sum.sigma += sigma;
         self.sum.innovation += innovation;
+        self.sum.lowest = self.sum.lowest.min(innovation);
+        self.sum.highest = self.sum.highest.max(innovation);
         self.filled += 1;
         if self.filled < self.per_point {
             return;
@@ -48,9 +63,10 @@ impl Trace {
             estimate: self.sum.estimate / n,
             sigma: self.sum.sigma / n,
             innovation: self.sum.innovation / n.sqrt(),
+            ..self.sum
         });
         self.filled = 0;
-        self.sum = Point::default();
+        self.sum = EMPTY;
         if self.points.len() == MOST_POINTS {
             self.points = self.points.chunks_exact(2).map(|pair| pair[0].merge(&pair[1])).collect();
             self.per_point *= 2;
@@ -75,6 +91,8 @@ impl Point {
             estimate: mean(self.estimate, other.estimate),
             sigma: mean(self.sigma, other.sigma),
             innovation: (self.innovation + other.innovation) * std::f64::consts::FRAC_1_SQRT_2,
+            lowest: self.lowest.min(other.lowest),
+            highest: self.highest.max(other.highest),
         }
     }
 }

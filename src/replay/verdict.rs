@@ -7,7 +7,8 @@
 //! [`effect::judge`](crate::consistency::effect::judge) states how p-values and effect sizes make the verdict.
 
 use super::{
-    AxisReplay, AxisResult, FinalState, LowFrequencySummary, Nis, ReplayResult, Replayer, Start, WhitenessSummary,
+    AxisReplay, AxisResult, FinalState, LowFrequencySummary, Nis, ReplayResult, Replayer, Sight, Start,
+    WhitenessSummary,
 };
 use crate::consistency::effect::{self, Effect};
 use crate::consistency::normalized::{gated_moments, moment_matched};
@@ -88,9 +89,12 @@ fn axis_result(axis: AxisReplay, design: &AxisDesign, log_axis: String, alpha: f
         whiteness: None,
         low_frequency: Vec::new(),
         start: None,
-        trace: axis.trace.points().to_vec(),
-        autocorrelation: Vec::new(),
-        cumulative_periodogram: Vec::new(),
+        sight: Sight {
+            trace: axis.trace.points().to_vec(),
+            samples_per_point: axis.trace.samples_per_point(),
+            nis_histogram: axis.nis_histogram.to_vec(),
+            ..Sight::default()
+        },
     };
     let mut tests = Vec::new();
     if accepted + axis.rejected < FEWEST_SAMPLES {
@@ -130,7 +134,8 @@ fn axis_result(axis: AxisReplay, design: &AxisDesign, log_axis: String, alpha: f
         let interval_s = length as f64 * dt;
         tests.push(periodogram.test(name, interval_s));
         let blocks = 2 * periodogram.ordinates + 1;
-        result.cumulative_periodogram = thinned(&periodogram.share)
+        result.sight.periodogram_bound = periodogram.bound;
+        result.sight.cumulative_periodogram = thinned(&periodogram.share)
             .map(|(i, share)| ((i + 1) as f64 / (blocks as f64 * interval_s), share))
             .collect();
     }
@@ -142,7 +147,8 @@ fn axis_result(axis: AxisReplay, design: &AxisDesign, log_axis: String, alpha: f
         ljung_box_p_value: whiteness.ljung_box_upper_p_value,
         lags: whiteness.lags,
     });
-    result.autocorrelation = whiteness.autocorrelation;
+    result.sight.autocorrelation_bound = normal_quantile(1.0 - alpha / 2.0) / (accepted as f64).sqrt();
+    result.sight.autocorrelation = whiteness.autocorrelation;
     (result, tests)
 }
 

@@ -81,7 +81,8 @@ fn y_scale(data: &Allan) -> Scale {
     let near = edges.map(|v| v.clamp(low / 3.0, (high * 3.0).max(low / 3.0)));
     // room for the words along the top
     let room = if data.points.iter().any(|p| !p.noise.is_empty()) { [high * (high / low).powf(0.12)] } else { [high] };
-    Scale::log(deviations().chain(near).chain(room))
+    // and a little below the lowest, where components cross
+    Scale::log(deviations().chain(near).chain(room).chain([low / 2.0]))
 }
 
 /// Runs of equal noise type, each from half way to its neighbours.

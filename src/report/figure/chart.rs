@@ -39,6 +39,8 @@ enum Mark {
 enum Sample {
     Line(Class),
     Band(usize),
+    /// A band inside a band.
+    Bands(usize),
     Dots(usize),
     Bar,
 }
@@ -123,6 +125,10 @@ impl Chart {
         self.entry(Sample::Band(series), label);
     }
 
+    pub(super) fn legend_bands(&mut self, series: usize, label: &str) {
+        self.entry(Sample::Bands(series), label);
+    }
+
     pub(super) fn legend_dots(&mut self, series: usize, label: &str) {
         self.entry(Sample::Dots(series), label);
     }
@@ -144,8 +150,8 @@ impl Chart {
     pub(super) fn render(&self) -> String {
         let legend = self.legend_places();
         let rows = legend.iter().map(|&(_, row)| row + 1).max().unwrap_or(0);
-        let top = EDGE + TITLE_ROW + rows * LEGEND_ROW + 210;
-        let height = (top + self.plot_height * UNITS + 470) / UNITS;
+        let top = EDGE + TITLE_ROW + rows * LEGEND_ROW + 260;
+        let height = (top + self.plot_height * UNITS + 430) / UNITS;
         let mut drawn = String::new();
         let outcome = {
             let root = SVGBackend::with_string(&mut drawn, ((WIDTH * UNITS) as u32, (height * UNITS) as u32))
@@ -170,7 +176,7 @@ impl Chart {
             .margin_right(150)
             .margin_bottom(EDGE / 2)
             .y_label_area_size(left)
-            .x_label_area_size(430)
+            .x_label_area_size(390)
             .build_cartesian_2d(self.x.scale.clone(), self.y.scale.clone())?;
         let label = text_style(Class::Label, LABEL_SIZE);
         chart
@@ -302,6 +308,11 @@ fn draw_entry(root: &Area<'_>, sample: Sample, label: &str, (x, y): (i32, i32)) 
     match sample {
         Sample::Line(class) => root.draw(&line(class))?,
         Sample::Band(series) => root.draw(&swatch(Class::Band(series)))?,
+        Sample::Bands(series) => {
+            root.draw(&swatch(Class::Band(series)))?;
+            let inner = [(x, y - 22), (x + SAMPLE, y + 22)];
+            root.draw(&Rectangle::new(inner, Class::Band(series).token().filled()))?;
+        }
         Sample::Bar => root.draw(&swatch(Class::Bar))?,
         Sample::Dots(series) => root.draw(&dot(series))?,
     }

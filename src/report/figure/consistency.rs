@@ -100,7 +100,10 @@ pub fn cumulative_periodogram(data: &Periodogram) -> String {
         Axis { name: "cumulative power".into(), unit: "fraction".into(), scale: Scale::linear_between(0.0, 1.0, 5.0) },
     );
     let w = data.half_width;
-    chart.band(5, vec![(0.0, -w, w), (end, 1.0 - w, 1.0 + w)]);
+    // with corners where an edge leaves the plot
+    let mut corners = [0.0, w.clamp(0.0, 1.0), (1.0 - w).clamp(0.0, 1.0), 1.0];
+    corners.sort_by(f64::total_cmp);
+    chart.band(5, corners.iter().map(|&t| (t * end, t - w, t + w)).collect());
     chart.line(Class::Expected, vec![(0.0, 0.0), (end, 1.0)]);
     chart.line(Class::Line(0), data.points.clone());
     chart.legend_line(Class::Line(0), "innovations");

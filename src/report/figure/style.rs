@@ -113,17 +113,18 @@ pub fn style_sheet() -> String {
         (Class::Axis, 9, ""),
         (Class::Bound, 12, ";stroke-dasharray:70 35"),
         (Class::Expected, 12, ";stroke-dasharray:25 25"),
-        (Class::Truth, 11, ""),
+        (Class::Truth, 9, ""),
     ] {
         css += &format!("{}{{fill:none;stroke-width:{width}{more}}}", class(what));
     }
+    css += &format!("{}{{fill-opacity:.45}}", class(Class::Bar));
     for (k, dashes) in DASHES.iter().enumerate() {
         css += &format!(
-            "{}{{fill:none;stroke-width:17;stroke-linejoin:round;stroke-dasharray:{dashes}}}",
+            "{}{{fill:none;stroke-width:15;stroke-linejoin:round;stroke-dasharray:{dashes}}}",
             class(Class::Line(k))
         );
         css += &format!("{}{{fill:none;stroke-width:10;stroke-dasharray:15 25}}", class(Class::Thin(k)));
-        css += &format!("{}{{fill:none;stroke-width:7;stroke-linejoin:round}}", class(Class::Thread(k)));
+        css += &format!("{}{{fill:none;stroke-width:8;stroke-linejoin:round}}", class(Class::Thread(k)));
         css += &format!("{}{{fill-opacity:.17}}", class(Class::Band(k)));
     }
     css += &rules("#1b1f24", "#57606a", "#dfe3e8", "#ffffff", "#a83a2c", &LIGHT);

@@ -99,12 +99,14 @@ pub fn estimate(data: &Estimate) -> String {
     let scaled = |k: f64| at(k).map(|(t, low, high)| (clock.show(t), low, high)).collect::<Vec<_>>();
     chart.band(0, scaled(3.0));
     chart.band(0, scaled(1.0));
+    if let Some(truth) = &data.truth {
+        chart.line(Class::Truth, truth.points.iter().map(|&(t, x)| (clock.show(t), x)).collect());
+    }
     chart.line(Class::Line(0), data.time_s.iter().zip(&data.estimate).map(|(&t, &x)| (clock.show(t), x)).collect());
     chart.legend_line(Class::Line(0), "estimate");
-    chart.legend_band(0, "±1σ, ±3σ");
+    chart.legend_bands(0, "±1σ and ±3σ");
     if let Some(truth) = &data.truth {
-        chart.line(Class::Line(1), truth.points.iter().map(|&(t, x)| (clock.show(t), x)).collect());
-        chart.legend_line(Class::Line(1), &truth.label);
+        chart.legend_line(Class::Truth, &truth.label);
     }
     chart.render()
 }
@@ -142,9 +144,12 @@ pub fn innovations(data: &Innovations) -> String {
         chart.line(Class::Thread(0), times.zip(data.lower.iter().copied()).collect());
         chart.legend_line(Class::Thread(0), "innovation");
     } else {
-        let ends = times.zip(data.lower.iter().zip(&data.upper));
-        chart.line(Class::Thread(0), ends.flat_map(|(t, (&low, &high))| [(t, low), (t, high)]).collect());
-        chart.legend_line(Class::Thread(0), "extremes per stretch");
+        let ends = times.zip(data.lower.iter().zip(&data.upper)).map(|(t, (&low, &high))| (t, low, high));
+        let ends: Vec<(f64, f64, f64)> = ends.collect();
+        chart.line(Class::Thread(0), ends.iter().map(|e| (e.0, e.1)).collect());
+        chart.line(Class::Thread(0), ends.iter().map(|e| (e.0, e.2)).collect());
+        chart.band(0, ends);
+        chart.legend_band(0, "extremes of each stretch");
     }
     chart.level(Class::Bound, 3.0);
     chart.level(Class::Bound, -3.0);

@@ -5,7 +5,17 @@ pub mod discretize;
 pub mod observability;
 pub mod plant;
 
+use std::collections::BTreeSet;
+
 use nalgebra::{DMatrix, DVector};
+
+use crate::numerics::linalg::{cholesky, cholesky_semidefinite, relative_to_diagonal};
+
+pub use augment::{InitialBias, augment};
+pub use plant::Plant;
+
+/// Largest asymmetry of a covariance, relative to √(P_ii P_jj), that counts as rounding of a printed number.
+const SYMMETRY_TOLERANCE: f64 = 1e-9;
 
 /// A state, input or measurement with its SI unit.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,7 +25,7 @@ pub struct Named {
 }
 
 /// A named discrete-time linear model x_{k+1} = F x_k + G u_k + v, z_k = H x_k + w, v ~ N(0,Q), w ~ N(0,R), x_0 ~ N(x0, P0). SI.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct LinearModel {
     pub dt: f64,
     pub states: Vec<Named>,
@@ -30,4 +40,165 @@ pub struct LinearModel {
     pub r: DMatrix<f64>,
     pub x0: DVector<f64>,
     pub p0: DMatrix<f64>,
+}
+
+/// Why a model cannot be built or used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ModelError {
+    /// `part` is the matrix letter or list of the model: `F`, `states[1].name`.
+    #[error("{part}: {message}")]
+    Part { part: String, message: String },
+    #[error("there is no white noise: a filter needs a measurement noise density greater than zero")]
+    NoMeasurementNoise,
+    #[error("unknown plant '{found}'; known plants: {known}")]
+    UnknownPlant { found: String, known: String },
+    #[error("{name} is {value}; expected a number greater than zero")]
+    NotPositive { name: &'static str, value: f64 },
+}
+
+impl ModelError {
+    fn part(part: impl Into<String>, message: impl Into<String>) -> Self {
+        ModelError::Part { part: part.into(), message: message.into() }
+    }
+}
+
+impl LinearModel {
+    /// Checks that names are unique, shapes fit, numbers are finite, Q and P0 are symmetric positive semidefinite and
+    /// R is diagonal and positive (measurements are taken one at a time).
+    ///
+    /// Errors: the first fault, with the part it is in, what was found and what was expected.
+    pub fn check(&self) -> Result<(), ModelError> {
+        if !(self.dt > 0.0 && self.dt.is_finite()) {
+            return Err(ModelError::NotPositive { name: "dt", value: self.dt });
+        }
+        for (list, names) in [("states", &self.states), ("inputs", &self.inputs), ("measurements", &self.measurements)]
+        {
+            check_names(list, names)?;
+        }
+        let (n, m) = (self.states.len(), self.measurements.len());
+        for (list, count) in [("states", n), ("measurements", m)] {
+            if count == 0 {
+                return Err(ModelError::part(list, "there is none; at least one is needed"));
+            }
+        }
+        if self.every.len() != m {
+            return Err(ModelError::part("every", format!("{} entries for {m} measurements", self.every.len())));
+        }
+        if let Some(i) = self.every.iter().position(|&every| every == 0) {
+            return Err(ModelError::part(
+                format!("measurements[{i}].every"),
+                "found 0; expected a whole number from 1 (every sample)",
+            ));
+        }
+        let states = count(n, "state");
+        let measured = count(m, "measurement");
+        let given = count(self.inputs.len(), "input");
+        check_matrix("F", &self.f, n, n, &states, &states)?;
+        check_matrix("G", &self.g, n, self.inputs.len(), &states, &given)?;
+        check_matrix("H", &self.h, m, n, &measured, &states)?;
+        check_matrix("Q", &self.q, n, n, &states, &states)?;
+        check_matrix("R", &self.r, m, m, &measured, &measured)?;
+        check_matrix("P0", &self.p0, n, n, &states, &states)?;
+        if self.x0.len() != n {
+            return Err(ModelError::part(
+                "x0",
+                format!("found {} numbers; expected {n}, one per state", self.x0.len()),
+            ));
+        }
+        if let Some(i) = self.x0.iter().position(|v| !v.is_finite()) {
+            return Err(ModelError::part(format!("x0[{i}]"), format!("{} is not a finite number", self.x0[i])));
+        }
+        for (letter, matrix) in [("Q", &self.q), ("R", &self.r), ("P0", &self.p0)] {
+            check_covariance(letter, matrix)?;
+        }
+        check_measurement_noise(&self.r)
+    }
+}
+
+fn check_names(list: &str, names: &[Named]) -> Result<(), ModelError> {
+    let mut seen = BTreeSet::new();
+    for (i, named) in names.iter().enumerate() {
+        if named.name.trim().is_empty() {
+            return Err(ModelError::part(format!("{list}[{i}].name"), "is empty"));
+        }
+        if !seen.insert(named.name.as_str()) {
+            return Err(ModelError::part(
+                format!("{list}[{i}].name"),
+                format!("'{}' appears twice; names must be unique", named.name),
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn count(n: usize, what: &str) -> String {
+    if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
+}
+
+fn check_matrix(
+    letter: &str,
+    a: &DMatrix<f64>,
+    rows: usize,
+    columns: usize,
+    per_row: &str,
+    per_column: &str,
+) -> Result<(), ModelError> {
+    if a.shape() != (rows, columns) {
+        return Err(ModelError::part(
+            letter,
+            format!("found {} x {}; expected {rows} x {columns} ({per_row} by {per_column})", a.nrows(), a.ncols()),
+        ));
+    }
+    for i in 0..rows {
+        for j in 0..columns {
+            if !a[(i, j)].is_finite() {
+                return Err(ModelError::part(
+                    format!("{letter}[{i}][{j}]"),
+                    format!("{} is not a finite number", a[(i, j)]),
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn check_covariance(letter: &str, a: &DMatrix<f64>) -> Result<(), ModelError> {
+    for i in 0..a.nrows() {
+        if a[(i, i)] < 0.0 {
+            return Err(ModelError::part(
+                format!("{letter}[{i}][{i}]"),
+                format!("found {:e}; a variance cannot be negative", a[(i, i)]),
+            ));
+        }
+    }
+    let scale: Vec<f64> = a.diagonal().iter().copied().collect();
+    for i in 0..a.nrows() {
+        for j in 0..i {
+            let difference = (a[(i, j)] - a[(j, i)]).abs();
+            if difference > SYMMETRY_TOLERANCE * (scale[i] * scale[j]).sqrt() {
+                return Err(ModelError::part(
+                    letter,
+                    format!("is not symmetric: [{i}][{j}] is {:e} but [{j}][{i}] is {:e}", a[(i, j)], a[(j, i)]),
+                ));
+            }
+        }
+    }
+    if cholesky_semidefinite(a).is_err() {
+        return Err(ModelError::part(
+            letter,
+            "is not positive semidefinite: some combination of states would have a negative variance",
+        ));
+    }
+    Ok(())
+}
+
+fn check_measurement_noise(r: &DMatrix<f64>) -> Result<(), ModelError> {
+    if cholesky(r).is_err() {
+        return Err(ModelError::part("R", "is not positive definite; every measurement needs noise"));
+    }
+    let off_diagonal = r - DMatrix::from_diagonal(&r.diagonal());
+    if relative_to_diagonal(&off_diagonal, r.diagonal().as_slice()) > 0.0 {
+        return Err(ModelError::part("R", "is not diagonal; measurements are processed one at a time"));
+    }
+    Ok(())
 }

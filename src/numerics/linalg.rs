@@ -68,7 +68,7 @@ pub fn cholesky_semidefinite(a: &DMatrix<f64>) -> Result<DMatrix<f64>, LinalgErr
             let s = complement(a, &l, i, j);
             if !zero {
                 l[(i, j)] = s / pivot.sqrt();
-            } else if !(s * s <= rounding * (a[(i, i)] * a[(j, j)]).abs()) {
+            } else if s * s > rounding * (a[(i, i)] * a[(j, j)]).abs() || s.is_nan() {
                 return Err(indefinite);
             }
         }

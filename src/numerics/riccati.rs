@@ -88,7 +88,7 @@ pub fn dare_eigenvector(
     let modulus: Vec<f64> = (0..2 * n).map(|i| numerators[i].norm() / denominators[i].norm()).collect();
     let mut order: Vec<usize> = (0..2 * n).collect();
     order.sort_by(|&i, &j| modulus[i].total_cmp(&modulus[j]));
-    if order.get(n.wrapping_sub(1)).is_some_and(|&last| !(modulus[last] < 1.0)) {
+    if order.get(n.wrapping_sub(1)).is_some_and(|&last| modulus[last] >= 1.0 || modulus[last].is_nan()) {
         return Err(failure());
     }
     let vectors = pencil.U();

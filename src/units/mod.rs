@@ -202,3 +202,20 @@ impl fmt::Display for Unit {
         f.write_str(&self.text)
     }
 }
+
+/// Four significant digits, plain where readable: 0.0562, 193.9, 1.234e-7.
+pub fn digits(x: f64) -> String {
+    if !x.is_finite() {
+        return x.to_string();
+    }
+    if x == 0.0 {
+        return "0".into();
+    }
+    let exponent = x.abs().log10().floor();
+    if (-4.0..6.0).contains(&exponent) {
+        let decimals = (3.0 - exponent).max(0.0) as usize;
+        format!("{x:.decimals$}")
+    } else {
+        format!("{x:.3e}")
+    }
+}

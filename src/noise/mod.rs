@@ -4,14 +4,15 @@
 //! `density` u/√Hz, `std_dev` u, `correlation_time` s, rate-random-walk `density` u/√s, `coefficient` of flicker u,
 //! of quantisation u·s, `slope` u/s.
 
-pub mod bias_instability;
-pub mod gauss_markov;
-pub mod quantization;
-pub mod ramp;
-pub mod random_walk;
-pub mod white;
+mod bias_instability;
+mod gauss_markov;
+mod quantization;
+mod ramp;
+mod random_walk;
+mod second_difference;
+mod white;
 
-use nalgebra::{DMatrix, DVector, RowDVector};
+use nalgebra::{DMatrix, RowDVector};
 use rand::rngs::ChaCha8Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -66,44 +67,104 @@ pub trait SamplePath {
 
 impl Term {
     pub fn kind(&self) -> Kind {
-        todo!()
+        match self {
+            Term::Quantization { .. } => Kind::Quantization,
+            Term::White { .. } => Kind::White,
+            Term::BiasInstability { .. } => Kind::BiasInstability,
+            Term::GaussMarkov { .. } => Kind::GaussMarkov,
+            Term::RateRandomWalk { .. } => Kind::RateRandomWalk,
+            Term::RateRamp { .. } => Kind::RateRamp,
+        }
     }
+
     /// Two-sided PSD of the *sampled* process at f (Hz), unit²/Hz, |f| ≤ 1/(2 dt). 0 for the ramp.
     pub fn psd(&self, f_hz: f64, dt: f64) -> f64 {
-        let _ = (f_hz, dt);
-        todo!()
+        match *self {
+            Term::Quantization { coefficient } => quantization::psd(coefficient, f_hz, dt),
+            Term::White { density } => white::psd(density),
+            Term::BiasInstability { coefficient } => bias_instability::psd(coefficient, f_hz, dt),
+            Term::GaussMarkov { std_dev, correlation_time } => gauss_markov::psd(std_dev, correlation_time, f_hz, dt),
+            Term::RateRandomWalk { density } => random_walk::psd(density, f_hz, dt),
+            Term::RateRamp { .. } => 0.0,
+        }
     }
-    /// Allan variance of the sampled process at averaging factor m (tau = m dt): formulas of the sampled form.
+
+    /// Allan variance of the sampled process at averaging factor m ≥ 1 (tau = m dt), unit².
+    /// For all terms but the ramp it equals 4 ∫₀^{1/2dt} S(f) sin⁴(πfm dt)/(m² sin²(πf dt)) df with S from [`Term::psd`].
     pub fn allan_variance(&self, m: u64, dt: f64) -> f64 {
-        let _ = (m, dt);
-        todo!()
+        match *self {
+            Term::Quantization { coefficient } => quantization::allan_variance(coefficient, m, dt),
+            Term::White { density } => white::allan_variance(density, m, dt),
+            Term::BiasInstability { coefficient } => bias_instability::allan_variance(coefficient, m),
+            Term::GaussMarkov { std_dev, correlation_time } => {
+                gauss_markov::allan_variance(std_dev, correlation_time, m, dt)
+            }
+            Term::RateRandomWalk { density } => random_walk::allan_variance(density, m, dt),
+            Term::RateRamp { slope } => ramp::allan_variance(slope, m, dt),
+        }
     }
-    /// Autocovariance at an integer lag; None for non-stationary terms (random walk, ramp, flicker).
+
+    /// Autocovariance at an integer lag, unit²; None for terms without a stationary one (random walk, ramp, flicker).
     pub fn autocovariance(&self, lag: u64, dt: f64) -> Option<f64> {
-        let _ = (lag, dt);
-        todo!()
+        match *self {
+            Term::Quantization { coefficient } => Some(quantization::autocovariance(coefficient, lag, dt)),
+            Term::White { density } => Some(white::autocovariance(density, lag, dt)),
+            Term::GaussMarkov { std_dev, correlation_time } => {
+                Some(gauss_markov::autocovariance(std_dev, correlation_time, lag, dt))
+            }
+            Term::BiasInstability { .. } | Term::RateRandomWalk { .. } | Term::RateRamp { .. } => None,
+        }
     }
+
     /// r_h = cov(z_k, z_{k+h}), z_k = θ_{k+2m} − 2θ_{k+m} + θ_k with θ the running sum of samples times dt: what the exact
-    /// degrees of freedom need. `r_0 = 2 m² dt² · allan_variance(m)`. Numerically sound for all m, h (no catastrophic cancellation).
+    /// degrees of freedom need. r_0 = 2 m² dt² · allan_variance(m), except for the ramp: it has no covariance (0), z_k is the
+    /// constant slope · m² dt². Error below 1e-10 r_0 for all m, h below 10¹².
     pub fn second_difference_autocovariance(&self, m: u64, h: u64, dt: f64) -> f64 {
-        let _ = (m, h, dt);
-        todo!()
+        self.second_difference_cross_covariance(m, m, h.min(i64::MAX as u64) as i64, dt)
     }
-    /// cov(z^{(m1)}_k, z^{(m2)}_{k+h}) for any signed h: the covariance between two Allan points.
+
+    /// cov(z^{(m1)}_k, z^{(m2)}_{k+h}) for any signed h: the covariance between two Allan points. O(1).
     pub fn second_difference_cross_covariance(&self, m1: u64, m2: u64, h: i64, dt: f64) -> f64 {
-        let _ = (m1, m2, h, dt);
-        todo!()
+        match *self {
+            Term::Quantization { coefficient } => quantization::second_difference(coefficient, m1, m2, h),
+            Term::White { density } => white::second_difference(density, m1, m2, h, dt),
+            Term::BiasInstability { coefficient } => bias_instability::second_difference(coefficient, m1, m2, h, dt),
+            Term::GaussMarkov { std_dev, correlation_time } => {
+                gauss_markov::second_difference(std_dev, correlation_time, m1, m2, h, dt)
+            }
+            Term::RateRandomWalk { density } => random_walk::second_difference(density, m1, m2, h, dt),
+            Term::RateRamp { .. } => 0.0,
+        }
     }
+
     /// State-space form for the filter; None for white noise (it is measurement noise, variance density²/dt).
-    /// `horizon_s` is used by flicker only: slowest time constant covered.
+    /// `horizon_s` is used by flicker only: its Allan variance is right to 0.6 % up to there.
     pub fn realisation(&self, dt: f64, horizon_s: f64) -> Option<Realisation> {
-        let _ = (dt, horizon_s);
-        todo!()
+        match *self {
+            Term::Quantization { coefficient } => Some(quantization::realisation(coefficient, dt)),
+            Term::White { .. } => None,
+            Term::BiasInstability { coefficient } => Some(bias_instability::realisation(coefficient, dt, horizon_s)),
+            Term::GaussMarkov { std_dev, correlation_time } => {
+                Some(gauss_markov::realisation(std_dev, correlation_time, dt))
+            }
+            Term::RateRandomWalk { density } => Some(random_walk::realisation(density, dt)),
+            Term::RateRamp { slope } => Some(ramp::realisation(slope, dt)),
+        }
     }
-    /// Exact discrete path with stationary start.
+
+    /// Discrete path, exact in law, with stationary start; the random walk and the ramp start at 0. Flicker is a sum of
+    /// Gauss–Markov paths whose Allan variance is right to 1e-4.
     pub fn sample_path(&self, dt: f64, rng: ChaCha8Rng) -> Box<dyn SamplePath + Send> {
-        let _ = (dt, rng);
-        todo!()
+        match *self {
+            Term::Quantization { coefficient } => Box::new(quantization::Path::new(coefficient, dt, rng)),
+            Term::White { density } => Box::new(white::Path::new(density, dt, rng)),
+            Term::BiasInstability { coefficient } => Box::new(bias_instability::Path::new(coefficient, rng)),
+            Term::GaussMarkov { std_dev, correlation_time } => {
+                Box::new(gauss_markov::Path::new(std_dev, correlation_time, dt, rng))
+            }
+            Term::RateRandomWalk { density } => Box::new(random_walk::Path::new(density, dt, rng)),
+            Term::RateRamp { slope } => Box::new(ramp::Path::new(slope, dt)),
+        }
     }
 }
 
@@ -123,6 +184,3 @@ impl NoiseModel {
             .sqrt()
     }
 }
-
-/// Kept so that the signature types are used before the bodies exist.
-pub type StateVector = DVector<f64>;

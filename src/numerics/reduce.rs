@@ -9,15 +9,17 @@ pub struct Sum {
 
 impl Sum {
     pub fn add(&mut self, x: f64) {
-        let _ = x;
-        todo!()
+        let total = self.sum + x;
+        self.compensation += if self.sum.abs() >= x.abs() { (self.sum - total) + x } else { (x - total) + self.sum };
+        self.sum = total;
     }
     pub fn value(&self) -> f64 {
-        self.sum + self.compensation
+        // an infinite or NaN sum has a NaN compensation: the plain sum says which
+        if self.sum.is_finite() { self.sum + self.compensation } else { self.sum }
     }
 }
 
-/// Running count, mean and variance (Welford, mergeable by Chan's formula).
+/// Running count, mean and variance (Welford 1962, mergeable by the formula of Chan, Golub, LeVeque 1979).
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Moments {
     pub count: u64,
@@ -27,21 +29,33 @@ pub struct Moments {
 
 impl Moments {
     pub fn add(&mut self, x: f64) {
-        let _ = x;
-        todo!()
+        self.count += 1;
+        let delta = x - self.mean;
+        self.mean += delta / self.count as f64;
+        self.m2 += delta * (x - self.mean);
     }
     pub fn merge(&mut self, other: &Moments) {
-        let _ = other;
-        todo!()
+        if other.count == 0 {
+            return;
+        }
+        let count = self.count + other.count;
+        let delta = other.mean - self.mean;
+        let weight = other.count as f64 / count as f64;
+        self.mean += delta * weight;
+        self.m2 += other.m2 + delta * delta * self.count as f64 * weight;
+        self.count = count;
     }
     /// Unbiased variance (n − 1); NaN below two samples.
     pub fn variance(&self) -> f64 {
-        let _ = self.m2;
-        todo!()
+        if self.count < 2 { f64::NAN } else { self.m2 / (self.count - 1) as f64 }
     }
 }
-/// Compensated mean of a slice.
+
+/// Compensated mean of a slice; NaN if it is empty.
 pub fn mean(x: &[f64]) -> f64 {
-    let _ = x;
-    todo!()
+    let mut sum = Sum::default();
+    for &x in x {
+        sum.add(x);
+    }
+    sum.value() / x.len() as f64
 }

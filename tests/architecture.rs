@@ -1,1 +1,356 @@
-//! Tests of architecture.
+//! The house keeps its floors: rooms use only lower ones, files stay readable, only the command line prints and exits.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// The one table of rooms: floor, room, and the rooms of its own floor it may use besides every lower floor.
+/// `docs/architecture.md` shows the same table.
+const HOUSE: [(u8, &str, &[&str]); 18] = [
+    (0, "units", &[]),
+    (0, "numerics", &[]),
+    (1, "signal", &[]),
+    (1, "noise", &[]),
+    (1, "params", &["noise"]),
+    (2, "input", &[]),
+    (2, "allan", &[]),
+    (2, "model", &[]),
+    (3, "filter", &[]),
+    (3, "simulate", &[]),
+    (3, "consistency", &["filter"]),
+    (4, "identify", &[]),
+    (4, "tune", &[]),
+    (4, "replay", &[]),
+    (5, "montecarlo", &[]),
+    (6, "export", &[]),
+    (6, "report", &[]),
+    (7, "cli", &[]),
+];
+
+const LONGEST_FILE: usize = 600;
+
+/// Packages of which two versions would mean two incompatible matrix, random-number or distribution types.
+const ONLY_ONCE: [&str; 7] = ["faer", "nalgebra", "rand", "rand_core", "rand_distr", "realfft", "statrs"];
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Every Rust file under src with its path relative to src, sorted.
+fn sources() -> Vec<(String, String)> {
+    fn walk(dir: &Path, out: &mut Vec<PathBuf>) {
+        for entry in std::fs::read_dir(dir).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                walk(&path, out);
+            } else if path.extension().is_some_and(|e| e == "rs") {
+                out.push(path);
+            }
+        }
+    }
+    let src = root().join("src");
+    let mut files = vec![];
+    walk(&src, &mut files);
+    files.sort();
+    let name = |path: &Path| path.strip_prefix(&src).unwrap().to_string_lossy().replace('\\', "/");
+    files.iter().map(|path| (name(path), std::fs::read_to_string(path).unwrap())).collect()
+}
+
+/// Identifiers and punctuation without comments, strings and character literals; `::` is one token.
+fn tokens(source: &str) -> Vec<String> {
+    let chars: Vec<char> = source.chars().collect();
+    let at = |i: usize| chars.get(i).copied().unwrap_or('\0');
+    let word = |c: char| c.is_alphanumeric() || c == '_';
+    let mut out = vec![];
+    let mut i = 0;
+    while i < chars.len() {
+        match at(i) {
+            '/' if at(i + 1) == '/' => {
+                while i < chars.len() && at(i) != '\n' {
+                    i += 1;
+                }
+            }
+            '/' if at(i + 1) == '*' => {
+                let mut depth = 0;
+                loop {
+                    match (at(i), at(i + 1)) {
+                        ('/', '*') => (depth, i) = (depth + 1, i + 2),
+                        ('*', '/') => (depth, i) = (depth - 1, i + 2),
+                        _ => i += 1,
+                    }
+                    if depth == 0 || i >= chars.len() {
+                        break;
+                    }
+                }
+            }
+            '"' => {
+                i += 1;
+                while i < chars.len() && at(i) != '"' {
+                    i += if at(i) == '\\' { 2 } else { 1 };
+                }
+                i += 1;
+            }
+            // 'x' and '\n' are characters, 'a in a type is a lifetime
+            '\'' if at(i + 1) == '\\' => {
+                i += 3;
+                while i < chars.len() && at(i) != '\'' {
+                    i += 1;
+                }
+                i += 1;
+            }
+            '\'' if at(i + 2) == '\'' => i += 3,
+            c if word(c) => {
+                let start = i;
+                while word(at(i)) {
+                    i += 1;
+                }
+                let text: String = chars[start..i].iter().collect();
+                let raw = matches!(text.as_str(), "r" | "br" | "cr") && matches!(at(i), '"' | '#');
+                let hashes = (i..).take_while(|&k| at(k) == '#').count();
+                if raw && at(i + hashes) == '"' {
+                    i += hashes + 1;
+                    while i < chars.len() && !(at(i) == '"' && (1..=hashes).all(|k| at(i + k) == '#')) {
+                        i += 1;
+                    }
+                    i += 1 + hashes;
+                } else {
+                    out.push(text);
+                }
+            }
+            ':' if at(i + 1) == ':' => {
+                out.push("::".into());
+                i += 2;
+            }
+            c => {
+                if !c.is_whitespace() {
+                    out.push(c.into());
+                }
+                i += 1;
+            }
+        }
+    }
+    out
+}
+
+/// All paths written from `tokens[at]` on, which is behind a `::`: one, or several for a `{…}` group.
+fn path_tails(tokens: &[String], at: usize) -> Vec<Vec<String>> {
+    let token = |i: usize| tokens.get(i).map_or("", String::as_str);
+    if token(at) == "{" {
+        let mut out = vec![];
+        let (mut depth, mut i, mut fresh) = (1, at + 1, true);
+        while depth > 0 && i < tokens.len() {
+            match token(i) {
+                "{" => depth += 1,
+                "}" => depth -= 1,
+                "," if depth == 1 => fresh = true,
+                _ if depth == 1 && fresh => {
+                    out.extend(path_tails(tokens, i));
+                    fresh = false;
+                }
+                _ => {}
+            }
+            i += 1;
+        }
+        return out;
+    }
+    let mut path = vec![token(at).to_owned()];
+    let mut i = at + 1;
+    while token(i) == "::" {
+        if token(i + 1) == "{" {
+            let heads = path_tails(tokens, i + 1);
+            return heads.into_iter().map(|tail| [path.clone(), tail].concat()).collect();
+        }
+        path.push(token(i + 1).to_owned());
+        i += 2;
+    }
+    vec![path]
+}
+
+/// The rooms that a file names by `crate::…`, by `super::…` up to the root, or (main.rs) by the name of the crate.
+fn rooms_used(file: &str, source: &str) -> BTreeSet<String> {
+    let mut home: Vec<String> = file.trim_end_matches(".rs").split('/').map(String::from).collect();
+    if home.last().is_some_and(|last| matches!(last.as_str(), "mod" | "lib" | "main")) {
+        home.pop();
+    }
+    let tokens = tokens(source);
+    let token = |i: usize| tokens.get(i).map_or("", String::as_str);
+    // inline modules around the place: depth of braces at which each ends
+    let (mut depth, mut inner) = (0, Vec::<(usize, String)>::new());
+    let mut rooms = BTreeSet::new();
+    for i in 0..tokens.len() {
+        match token(i) {
+            "{" => depth += 1,
+            "}" => {
+                depth -= 1;
+                inner.retain(|(end, _)| *end < depth + 1);
+            }
+            "mod" if token(i + 2) == "{" => inner.push((depth + 1, token(i + 1).to_owned())),
+            // a path starts here, unless it continues one
+            "crate" | "super" | "self" | "kfdesign" if token(i + 1) == "::" && (i == 0 || token(i - 1) != "::") => {
+                let mut place = home.clone();
+                place.extend(inner.iter().map(|(_, name)| name.clone()));
+                for path in path_tails(&tokens, i) {
+                    let mut here = place.clone();
+                    for step in path {
+                        match step.as_str() {
+                            "crate" | "kfdesign" => here.clear(),
+                            "self" => {}
+                            "super" => {
+                                here.pop();
+                            }
+                            name => here.push(name.to_owned()),
+                        }
+                    }
+                    rooms.extend(here.into_iter().next());
+                }
+            }
+            _ => {}
+        }
+    }
+    rooms
+}
+
+/// What is wrong with one file; empty when nothing is.
+fn complaints(file: &str, source: &str) -> Vec<String> {
+    let mut out = vec![];
+    let lines = source.lines().count();
+    if lines > LONGEST_FILE {
+        out.push(format!("src/{file} has {lines} lines, at most {LONGEST_FILE}: divide it"));
+    }
+    let room = file.split('/').next().unwrap().trim_end_matches(".rs");
+    let row = |name: &str| HOUSE.iter().find(|r| r.1 == name);
+    if !matches!(room, "lib" | "main") {
+        let Some(&(floor, _, neighbours)) = row(room) else {
+            out.push(format!("src/{file}: room {room} stands on no floor: add it to the table"));
+            return out;
+        };
+        for used in rooms_used(file, source) {
+            let Some(&(other, name, _)) = row(&used) else { continue };
+            if name != room && other >= floor && !neighbours.contains(&name) {
+                out.push(format!("src/{file}: {room} (floor {floor}) uses {name} (floor {other})"));
+            }
+        }
+    }
+    let tokens = tokens(source);
+    let has = |words: &[&str]| tokens.windows(words.len()).any(|w| w.iter().zip(words).all(|(a, b)| a == b));
+    if room != "cli" {
+        for name in ["print", "println", "eprint", "eprintln", "dbg"] {
+            if has(&[name, "!"]) {
+                out.push(format!("src/{file}: {name}! outside src/cli"));
+            }
+        }
+        if has(&["anyhow"]) {
+            out.push(format!("src/{file}: anyhow outside src/cli: give the room its own error type"));
+        }
+        for stream in ["stdout", "stderr"] {
+            if has(&[stream, "("]) {
+                out.push(format!("src/{file}: {stream}() outside src/cli"));
+            }
+        }
+    }
+    if file != "main.rs" && (has(&["process", "::", "exit"]) || has(&["exit", "("])) {
+        out.push(format!("src/{file}: exit outside main.rs: return a status instead"));
+    }
+    out
+}
+
+#[test]
+fn every_file_keeps_to_its_floor() {
+    let all: Vec<String> = sources().iter().flat_map(|(file, source)| complaints(file, source)).collect();
+    assert!(all.is_empty(), "\n{}", all.join("\n"));
+}
+
+#[test]
+fn every_room_is_in_the_table_and_every_row_is_a_room() {
+    let rooms: BTreeSet<String> = sources()
+        .iter()
+        .map(|(file, _)| file.split('/').next().unwrap().trim_end_matches(".rs").to_owned())
+        .filter(|room| !matches!(room.as_str(), "lib" | "main"))
+        .collect();
+    let table: BTreeSet<String> = HOUSE.iter().map(|row| row.1.to_owned()).collect();
+    assert_eq!(rooms, table);
+}
+
+/// Rows `| floor | room | what it holds | neighbours |` of docs/architecture.md.
+#[test]
+fn the_documentation_shows_the_same_table() {
+    let page = std::fs::read_to_string(root().join("docs/architecture.md")).unwrap();
+    let shown: Vec<(u8, String, Vec<String>)> = page
+        .lines()
+        .filter_map(|line| {
+            let cells: Vec<&str> = line.trim().trim_matches('|').split('|').map(str::trim).collect();
+            let &[floor, room, _, neighbours] = cells.as_slice() else { return None };
+            let neighbours = neighbours.split(',').map(|n| n.trim().trim_matches('`').to_owned());
+            Some((floor.parse().ok()?, room.trim_matches('`').into(), neighbours.filter(|n| n != "–").collect()))
+        })
+        .collect();
+    let table: Vec<(u8, String, Vec<String>)> = HOUSE
+        .iter()
+        .map(|(floor, room, n)| (*floor, (*room).into(), n.iter().map(|n| (*n).into()).collect()))
+        .collect();
+    assert_eq!(shown, table, "docs/architecture.md and the table of this test differ");
+}
+
+#[test]
+fn one_version_of_the_mathematical_packages() {
+    let lock = std::fs::read_to_string(root().join("Cargo.lock")).unwrap();
+    let mut versions: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    let value = |line: &str| line.split('"').nth(1).unwrap_or_default().to_owned();
+    for package in lock.split("[[package]]").skip(1) {
+        let field = |key: &str| package.lines().find(|l| l.starts_with(key)).map(value).unwrap_or_default();
+        versions.entry(field("name = ")).or_default().push(field("version = "));
+    }
+    for name in ONLY_ONCE {
+        let found = versions.get(name).cloned().unwrap_or_default();
+        assert_eq!(found.len(), 1, "{name} must be in Cargo.lock once, found {found:?}: `cargo tree -d` says who asks");
+    }
+}
+
+/// The checks above would pass on an empty house; here each sees what it is for.
+#[test]
+fn each_rule_bites() {
+    let bites = |file: &str, source: &str| !complaints(file, source).is_empty();
+    // upwards, in every way of writing it
+    for source in [
+        "use crate::filter::Kalman;",
+        "pub(crate) use crate::{units::Unit, filter::{self, Kalman}};",
+        "fn f() -> crate::cli::Status { todo() }",
+        "use super::super::filter::Kalman;",
+        "mod tests { use super::super::super::replay::Replayer; }",
+        "use crate::signal::Recording;",
+        "use crate::params::Params;",
+    ] {
+        assert!(bites("noise/white.rs", source), "{source}");
+    }
+    // downwards, sideways where the table allows it, inside the room, and in words only
+    for (file, source) in [
+        ("noise/white.rs", "use crate::numerics::random; use super::Term; use crate::noise::Term;"),
+        ("noise/white.rs", "/// as in [`crate::filter`]\nconst S: &str = \"crate::filter\"; // crate::filter"),
+        ("noise/white.rs", "const S: &str = r#\"a \" crate::filter\"#; /* crate::filter /* */ crate::cli */"),
+        ("noise/white.rs", "fn f<'a>(c: &'a char) -> bool { *c == '\"' || *c == '\\'' }"),
+        ("noise/white.rs", "mod tests { use super::super::Term; use super::*; }"),
+        ("params.rs", "use crate::noise::Term;"),
+        ("consistency/whiteness.rs", "use crate::filter::Kalman;"),
+        ("cli/output.rs", "fn f() -> anyhow::Result<()> { println!(); crate::report::page::Page; }"),
+        ("main.rs", "fn main() { kfdesign::cli::main(); std::process::exit(1) }"),
+    ] {
+        assert_eq!(complaints(file, source), Vec::<String>::new(), "{source}");
+    }
+    assert!(bites("filter/kalman.rs", "use crate::consistency::Test;"));
+    assert!(bites("units.rs", "use crate::numerics::linalg;"));
+    assert!(bites("kitchen.rs", ""));
+    assert!(bites("tune/mod.rs", &"\n".repeat(LONGEST_FILE + 1)));
+    assert!(!bites("tune/mod.rs", &"\n".repeat(LONGEST_FILE)));
+    for source in [
+        "fn f() { println!(\"x\") }",
+        "fn f() { eprint!() }",
+        "use anyhow::Context;",
+        "fn f() { std::io::stdout().lock(); }",
+    ] {
+        assert!(bites("tune/mod.rs", source), "{source}");
+    }
+    for source in
+        ["fn f() { std::process::exit(2) }", "use std::process; fn f() { process::exit(2) }", "fn f() { exit(2) }"]
+    {
+        assert!(bites("cli/mod.rs", source), "{source}");
+    }
+}

@@ -1,10 +1,10 @@
 //! Equivalent degrees of freedom of the family, covariance between overlapping Allan points, chi-square intervals.
 //!
-//! Exact for any Gaussian mixture (ADEV, overlapping ADEV, HDEV, overlapping HDEV): the estimate is the mean of J squares of
-//! a stationary difference u with mean μ and autocovariance ρ_j, so its mean and variance are known and
+//! Exact for any Gaussian mixture (all but TOTDEV): the estimate is the mean of J squares of a stationary difference u
+//! with mean μ and autocovariance ρ_j, so its mean and variance are known and
 //! `edf = 2 mean² / variance = (J(ρ_0 + μ²))² / [J ρ_0² + 2 Σ (J−j) ρ_j² + 2μ² (J ρ_0 + 2 Σ (J−j) ρ_j)]`
-//! (Satterthwaite matching; μ is not zero only with a rate ramp). Published approximations, for the power law that
-//! dominates at the averaging time: MDEV (Greenhall and Riley 2003) and TOTDEV (Riley 2008, NIST SP 1065, table 7).
+//! (Satterthwaite matching; μ is not zero only with a rate ramp). Published approximations: TOTDEV (Riley 2008, NIST SP
+//! 1065, table 7), always; MDEV (Greenhall and Riley 2003) as long as only a power law is known.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -14,7 +14,7 @@ use crate::noise::{NoiseModel, Term};
 use crate::numerics::distribution::chi_square_quantile;
 
 /// Degrees of freedom of the estimate at averaging factor `m` from `samples` rate samples of period `dt` (s) for this
-/// noise mixture. Exact, or by the dominating power law for MDEV and TOTDEV (see the module).
+/// noise mixture. Exact; for TOTDEV by the power law that dominates at this averaging time.
 ///
 /// NaN when no difference fits or the mixture is empty; infinite for a ramp without noise.
 pub fn degrees_of_freedom(kind: Deviation, samples: usize, m: u64, dt: f64, model: &NoiseModel) -> f64 {
@@ -31,16 +31,20 @@ pub fn degrees_of_freedom(kind: Deviation, samples: usize, m: u64, dt: f64, mode
         Deviation::Oadev => satterthwaite(terms, mean, &[0, span, 2 * span], second),
         Deviation::Hdev => satterthwaite(terms, 0.0, &[0, 1, 2, 3], |j| third(j * span, span)),
         Deviation::Ohdev => satterthwaite(terms, 0.0, &[0, span, 2 * span, 3 * span], |h| third(h, span)),
-        Deviation::Mdev | Deviation::Totdev => power_law_degrees_of_freedom(kind, samples, m, dominating(model, m, dt)),
+        Deviation::Mdev => {
+            let sum = |h: i64| moving_sum(&second, h, span);
+            satterthwaite(terms, mean * m as f64, &[0, span, 2 * span, 3 * span], sum)
+        }
+        Deviation::Totdev => power_law_degrees_of_freedom(kind, samples, m, dominating(model, m, dt)),
     }
 }
 
-/// Degrees of freedom when the noise at this averaging time is one power law. Exact for ADEV, overlapping ADEV, HDEV and
-/// overlapping HDEV. A ramp counts as random walk (the noise below the ramp), unknown noise as white.
+/// Degrees of freedom when the noise at this averaging time is one power law. Exact but for MDEV and TOTDEV, where the
+/// published formulas are used. A ramp counts as random walk (the noise below the ramp), unknown noise as white.
 pub fn power_law_degrees_of_freedom(kind: Deviation, samples: usize, m: u64, noise: NoiseType) -> f64 {
     match kind {
         Deviation::Mdev if m > 1 => greenhall_riley_modified(samples, m, noise),
-        // at m = 1 it is the same statistic
+        // one second difference in the sum: the overlapping ADEV
         Deviation::Mdev => degrees_of_freedom(Deviation::Oadev, samples, m, 1.0, &unit_model(noise)),
         Deviation::Totdev => total(samples, m, noise),
         _ => degrees_of_freedom(kind, samples, m, 1.0, &unit_model(noise)),
@@ -74,6 +78,26 @@ pub fn interval(deviation: f64, edf: f64) -> (f64, f64) {
     }
     let factor = |p: f64| (edf / chi_square_quantile(p, edf)).sqrt();
     (deviation * factor(0.975), deviation * factor(0.025))
+}
+
+/// Mean of the variance that [`deviation::variance`] estimates, for this mixture, unit². Exact with three remarks: a random
+/// walk, flicker and Gauss-Markov in their sampled forms; TOTDEV is taken as the Allan variance that it approximates
+/// (it falls below by up to tau/T × 0.48 for flicker, 0.75 for random walk: NIST SP 1065, table 7).
+pub fn expected_variance(kind: Deviation, m: u64, dt: f64, model: &NoiseModel) -> f64 {
+    let (span, tau) = (m as i64, m as f64 * dt);
+    let second = |h: i64| autocovariance(model, m, h, dt);
+    let mean = mean_second_difference(model, m, dt);
+    match kind {
+        Deviation::Adev | Deviation::Oadev | Deviation::Totdev => model.allan_variance(m, dt),
+        Deviation::Mdev => (moving_sum(&second, 0, span) / (m as f64).powi(2) + mean * mean) / (2.0 * tau * tau),
+        Deviation::Hdev | Deviation::Ohdev => 2.0 * (second(0) - second(span)) / (6.0 * tau * tau),
+    }
+}
+
+/// Autocovariance at `lag` of the moving sum over m second differences: `Σ_{|u|<m} (m − |u|) r_{lag+u}`.
+fn moving_sum(second: &impl Fn(i64) -> f64, lag: i64, m: i64) -> f64 {
+    let kinks = [-2 * m, -m, 0, m, 2 * m].map(|edge| edge - lag);
+    lag_sum::sum(-m..=m, &kinks, &[0], |u| (m - u.abs()) as f64 * second(lag + u))
 }
 
 /// Which power law the mixture follows around this averaging time: by the local slope of its Allan variance.

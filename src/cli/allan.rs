@@ -1,12 +1,322 @@
 //! `kfdesign allan`.
 
-use super::Status;
+use std::path::PathBuf;
+
+use anyhow::{Context, bail};
+use clap::ValueEnum;
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::log_flags::{LogFlags, print_check};
+use super::output::{digits, print_json, print_text, progress, table};
+use super::stretch::{Stretch, stretches};
+use super::{Status, allan_figure};
+use crate::allan::{self, AllanCurve, Deviation, NoiseType, TauGrid};
+use crate::export::atomic;
+use crate::identify::{self, Method, ModelChoice};
+use crate::noise::NoiseModel;
+use crate::signal::LogCheck;
+use crate::units::Quantity;
 
 /// Allan deviations of a log, with intervals and noise identification
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+pub struct Args {
+    /// Log at rest: csv, txt, gz or npy
+    log: PathBuf,
+    /// Which deviation
+    #[arg(long, value_enum, default_value_t = DeviationArg::Oadev)]
+    deviation: DeviationArg,
+    /// Averaging times: octave, decade (1, 2, 4, 10 …), log:N (N per decade), log (20 per decade) or all
+    #[arg(long, value_parser = parse_grid, default_value = "octave", value_name = "GRID")]
+    taus: TauGrid,
+    /// One JSON document on stdout
+    #[arg(long)]
+    json: bool,
+    /// SVG figure with interval band and fitted components
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// The JSON document into a file
+    #[arg(short, long, value_name = "FILE.json")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    reading: LogFlags,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum DeviationArg {
+    /// Allan deviation, differences that do not overlap
+    Adev,
+    /// Overlapping Allan deviation
+    Oadev,
+    /// Modified Allan deviation
+    Mdev,
+    /// Hadamard deviation, differences that do not overlap
+    Hdev,
+    /// Overlapping Hadamard deviation
+    Ohdev,
+    /// Total deviation
+    Totdev,
+}
+
+impl DeviationArg {
+    fn kind(self) -> Deviation {
+        match self {
+            DeviationArg::Adev => Deviation::Adev,
+            DeviationArg::Oadev => Deviation::Oadev,
+            DeviationArg::Mdev => Deviation::Mdev,
+            DeviationArg::Hdev => Deviation::Hdev,
+            DeviationArg::Ohdev => Deviation::Ohdev,
+            DeviationArg::Totdev => Deviation::Totdev,
+        }
+    }
+    fn title(self) -> &'static str {
+        match self {
+            DeviationArg::Adev => "Allan deviation",
+            DeviationArg::Oadev => "Overlapping Allan deviation",
+            DeviationArg::Mdev => "Modified Allan deviation",
+            DeviationArg::Hdev => "Hadamard deviation",
+            DeviationArg::Ohdev => "Overlapping Hadamard deviation",
+            DeviationArg::Totdev => "Total deviation",
+        }
+    }
+}
+
+fn parse_grid(text: &str) -> Result<TauGrid, String> {
+    match text {
+        "octave" => Ok(TauGrid::Octave),
+        "decade" => Ok(TauGrid::Decade),
+        "all" => Ok(TauGrid::All),
+        "log" => Ok(TauGrid::Log(20)),
+        _ => text
+            .strip_prefix("log:")
+            .and_then(|count| count.parse().ok())
+            .filter(|count| (1..=1000).contains(count))
+            .map(TauGrid::Log)
+            .ok_or_else(|| "expected octave, decade, all, log or log:N with N from 1 to 1000".into()),
+    }
+}
+
+/// What `allan --json` prints.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Document {
+    /// "kfdesign-allan/1".
+    pub format: &'static str,
+    pub deviation: Deviation,
+    pub quantity: Quantity,
+    pub sample_rate: SampleRate,
+    pub axes: Vec<AxisDocument>,
+    pub log: LogCheck,
+}
+
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct SampleRate {
+    pub value: f64,
+    pub unit: &'static str,
+}
+
+/// The curve of one axis; all lists have one entry per averaging time.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct AxisDocument {
+    pub name: String,
+    /// Unit of deviation, lower and upper: that of the log.
+    pub unit: String,
+    /// Samples used: the longest stretch without gaps and unusable samples.
+    pub samples: usize,
+    pub tau_s: Vec<f64>,
+    pub deviation: Vec<f64>,
+    /// 95 % interval.
+    pub lower: Vec<f64>,
+    pub upper: Vec<f64>,
+    pub edf: Vec<f64>,
+    /// Differences averaged.
+    pub terms: Vec<u64>,
+    pub noise: Vec<NoiseType>,
+    /// Where the degrees of freedom come from.
+    pub intervals: Intervals,
+    /// The fitted mixture, if there is one: kinds of its terms.
+    pub model: Option<String>,
+}
+
+/// Where the degrees of freedom come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Intervals {
+    /// Exact for the mixture fitted to the log (TOTDEV: published formula for the law that dominates).
+    FittedMixture,
+    /// For the power law identified at each point: no mixture could be fitted.
+    PowerLaw,
+}
+
+/// One axis, SI.
+pub(super) struct AxisCurve {
+    pub(super) stretch: Stretch,
+    pub(super) curve: AllanCurve,
+    /// The fitted mixture or why there is none.
+    pub(super) fit: Result<NoiseModel, String>,
+}
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
-    let _ = args;
-    todo!()
+    for output in args.output.iter().chain(&args.plot) {
+        atomic::refuse_input_as_output(output, &args.log)?;
+    }
+    let options = args.reading.options()?;
+    let (recording, check) = crate::input::read(&args.log, &options)?;
+    print_check(&recording.name, &check);
+    let (dt, kind) = (recording.dt(), args.deviation.kind());
+    let parts = stretches(&recording, options.kind);
+    let bar = progress(parts.len() as u64, "Allan deviation");
+    let axes: Vec<AxisCurve> = parts
+        .into_par_iter()
+        .map(|part| {
+            let axis = axis_curve(part, dt, kind, args.taus);
+            bar.inc(1);
+            axis
+        })
+        .collect::<anyhow::Result<_>>()?;
+    bar.finish_and_clear();
+    if axes.is_empty() {
+        bail!("{}: no axis to work on", args.log.display());
+    }
+    for axis in &axes {
+        notes(axis);
+    }
+    let document = document(&axes, kind, recording.quantity, recording.sample_rate_hz, check);
+    if let Some(path) = &args.output {
+        let mut text = serde_json::to_string_pretty(&document)?;
+        text.push('\n');
+        atomic::write(path, text.as_bytes())?;
+    }
+    if let Some(path) = &args.plot {
+        atomic::write(path, allan_figure::sheet(&recording.name, args.deviation.title(), &axes).as_bytes())?;
+    }
+    if args.json {
+        print_json(&document)?;
+    } else {
+        let text: Vec<String> = axes.iter().map(|axis| text(axis, args.deviation)).collect();
+        print_text(&text.join("\n"))?;
+    }
+    Ok(Status::Done)
+}
+
+fn axis_curve(stretch: Stretch, dt: f64, kind: Deviation, grid: TauGrid) -> anyhow::Result<AxisCurve> {
+    let curve = match &stretch.phase {
+        Some(phase) => allan::curve_from_phase(phase, dt, kind, grid),
+        None => allan::curve(&stretch.rate, dt, kind, grid),
+    };
+    let mut curve = curve.with_context(|| stretch.name.clone())?;
+    let fit =
+        identify::identify_axis(&stretch.name, &stretch.rate, dt, &stretch.unit, Method::Allan, &ModelChoice::Auto)
+            .map(|identified| identified.model)
+            .map_err(|error| error.to_string());
+    if let Ok(model) = &fit {
+        curve.refine(model);
+    }
+    Ok(AxisCurve { stretch, curve, fit })
+}
+
+/// What a person should know about an axis beside the numbers, on stderr.
+fn notes(axis: &AxisCurve) {
+    let Stretch { name, rate, left_out, .. } = &axis.stretch;
+    if *left_out > 0 {
+        eprintln!(
+            "  note: {name}: the longest stretch without gaps and unusable samples is used: {} samples, {left_out} left out",
+            rate.len()
+        );
+    }
+    if let Err(reason) = &axis.fit {
+        eprintln!("  note: {name}: intervals are for the power law at each tau, no mixture was fitted: {reason}");
+    }
+}
+
+/// "white + gauss_markov".
+pub(super) fn model_name(model: &NoiseModel) -> String {
+    let names: Vec<String> = model
+        .terms
+        .iter()
+        .filter_map(|term| serde_json::to_value(term.kind()).ok())
+        .filter_map(|kind| kind.as_str().map(String::from))
+        .collect();
+    names.join(" + ")
+}
+
+fn document(axes: &[AxisCurve], deviation: Deviation, quantity: Quantity, rate_hz: f64, log: LogCheck) -> Document {
+    let axes = axes
+        .iter()
+        .map(|axis| {
+            let points = &axis.curve.points;
+            let display = |si: f64| axis.stretch.unit.from_si(si);
+            AxisDocument {
+                name: axis.stretch.name.clone(),
+                unit: axis.stretch.unit.text().into(),
+                samples: axis.curve.samples,
+                tau_s: points.iter().map(|p| p.tau_s).collect(),
+                deviation: points.iter().map(|p| display(p.deviation)).collect(),
+                lower: points.iter().map(|p| display(p.lower)).collect(),
+                upper: points.iter().map(|p| display(p.upper)).collect(),
+                edf: points.iter().map(|p| p.edf).collect(),
+                terms: points.iter().map(|p| p.terms).collect(),
+                noise: points.iter().map(|p| p.noise).collect(),
+                intervals: if axis.fit.is_ok() { Intervals::FittedMixture } else { Intervals::PowerLaw },
+                model: axis.fit.as_ref().ok().map(model_name),
+            }
+        })
+        .collect();
+    Document {
+        format: "kfdesign-allan/1",
+        deviation,
+        quantity,
+        sample_rate: SampleRate { value: rate_hz, unit: "Hz" },
+        axes,
+        log,
+    }
+}
+
+fn text(axis: &AxisCurve, deviation: DeviationArg) -> String {
+    let (unit, points) = (&axis.stretch.unit, &axis.curve.points);
+    let rows: Vec<Vec<String>> = points
+        .iter()
+        .map(|p| {
+            vec![
+                digits(p.tau_s),
+                digits(unit.from_si(p.deviation)),
+                digits(unit.from_si(p.lower)),
+                digits(unit.from_si(p.upper)),
+                digits(p.edf),
+                p.terms.to_string(),
+                noise_name(p.noise).into(),
+            ]
+        })
+        .collect();
+    let header = ["tau (s)", &format!("deviation ({unit})"), "95 % from", "to", "edf", "terms", "noise"];
+    let basis = match &axis.fit {
+        Ok(model) if deviation.kind() == Deviation::Totdev => {
+            format!("published formula for the dominating law of the fitted {}", model_name(model))
+        }
+        Ok(model) => format!("exact for the fitted {}", model_name(model)),
+        Err(_) => "for the power law at each tau".into(),
+    };
+    let lowest = points.iter().filter(|p| p.deviation > 0.0).min_by(|a, b| a.deviation.total_cmp(&b.deviation));
+    let lowest = lowest.map_or_else(String::new, |p| {
+        format!("Lowest: {} {unit} at {} s. ", digits(unit.from_si(p.deviation)), digits(p.tau_s))
+    });
+    format!(
+        "{}: {} of {} samples\n{}{lowest}Intervals: {basis}.\n",
+        axis.stretch.name,
+        deviation.title().to_lowercase().replace("allan", "Allan").replace("hadamard", "Hadamard"),
+        axis.curve.samples,
+        table(&header, &rows),
+    )
+}
+
+/// In words; a dash where too few averages are left to tell.
+pub(super) fn noise_name(noise: NoiseType) -> &'static str {
+    match noise {
+        NoiseType::Quantization => "quantization",
+        NoiseType::White => "white",
+        NoiseType::Flicker => "flicker",
+        NoiseType::RandomWalk => "random walk",
+        NoiseType::Ramp => "ramp",
+        NoiseType::Unknown => "-",
+    }
 }

@@ -5,12 +5,14 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "the command line is the one place that prints")]
 
 pub mod allan;
+mod allan_figure;
 pub mod identify;
 pub mod log_flags;
 pub mod output;
 pub mod replay;
 pub mod schema;
 pub mod simulate;
+mod stretch;
 pub mod tune;
 
 use std::process::ExitCode;

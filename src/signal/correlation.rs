@@ -114,6 +114,47 @@ mod tests {
         }
     }
 
+    /// 300 steps of a random walk from the congruential generator of NIST SP 1065.
+    fn walk() -> Vec<f64> {
+        let uniform = std::iter::successors(Some(16807_u64), |n| Some(16807 * n % 2_147_483_647));
+        uniform
+            .take(300)
+            .scan(0.0, |sum, n| {
+                *sum += n as f64 / 2_147_483_647.0 - 0.5;
+                Some(*sum)
+            })
+            .collect()
+    }
+
+    /// statsmodels 0.15.0: `acovf(w, adjusted=False, fft=False, nlag=4)`, `acf(w, adjusted=False, fft=False, nlags=200)`.
+    #[test]
+    fn independent_values() {
+        let w = walk();
+        let expected =
+            [3.367182141361066, 3.3183977027916622, 3.268332092872426, 3.225967184928152, 3.1806259312352263];
+        for (ours, theirs) in autocovariance(&w, 4).iter().zip(expected) {
+            assert!((ours / theirs - 1.0).abs() < 1e-12, "{ours} and {theirs}");
+        }
+        let r = autocorrelation(&w, 200);
+        for (lag, theirs) in [
+            (0, 1.0),
+            (1, 0.9855117910106032),
+            (2, 0.9706430943326745),
+            (50, 0.058449710566269276),
+            (200, -0.23061208761050192),
+        ] {
+            assert!((r[lag] - theirs).abs() < 1e-12, "lag {lag}: {} and {theirs}", r[lag]);
+        }
+    }
+
+    #[test]
+    fn empty_constant_and_short_series() {
+        assert!(autocovariance(&[], 3).is_empty());
+        assert!(autocorrelation(&[2.0; 10], 3).iter().all(|r| r.is_nan()));
+        assert_eq!(autocovariance(&[1.0, 3.0], 4), [1.0, -0.5, 0.0, 0.0, 0.0]);
+        assert!(autocovariance(&[1.0, f64::NAN, 2.0], 2).iter().all(|c| c.is_nan()));
+    }
+
     #[test]
     fn fast_lengths_have_only_factors_two_and_three() {
         for n in 1..5000_usize {

@@ -13,7 +13,7 @@ use kfdesign::numerics::random::{StreamId, fill_normal, stream};
 
 /// A deterministic series, mean removed: sin(0.37 k²) + 0.3 sin(0.9 k), k < 400.
 fn series() -> Vec<f64> {
-    let x: Vec<f64> = (0..400).map(|k| f64::from(k)).map(|k| (0.37 * k * k).sin() + 0.3 * (0.9 * k).sin()).collect();
+    let x: Vec<f64> = (0..400).map(f64::from).map(|k| (0.37 * k * k).sin() + 0.3 * (0.9 * k).sin()).collect();
     let mean = x.iter().sum::<f64>() / x.len() as f64;
     x.iter().map(|v| v - mean).collect()
 }
@@ -279,7 +279,6 @@ fn sizes_under_the_null_hypothesis() {
         family += u32::from(judge(&mut tests, alpha) == Verdict::Inconsistent);
     }
     let n = runs as f64;
-    println!("sizes: {:?}, family {}", rejected.map(|r| f64::from(r) / n), f64::from(family) / n);
     let spread = 4.9 * (alpha * (1.0 - alpha) / n).sqrt();
     for (r, slack) in rejected.iter().zip([0.0, 0.006, 0.006, 0.0, 0.0, 0.002]) {
         let size = f64::from(*r) / n;

@@ -62,7 +62,7 @@ fn too_short(axis: &AxisReplay, design: &AxisDesign) -> Option<String> {
     if accepted < axis.samples / 2 {
         return Some(format!("{}: only {accepted} of {} samples were accepted", design.name, axis.samples));
     }
-    let needed = axis.low_frequency.samples_needed() * axis.every;
+    let needed = axis.low_frequency.samples_needed().saturating_mul(axis.every);
     Some(format!(
         "{}: {accepted} accepted samples are too few to judge the drift, {needed} are needed ({} s)",
         design.name,

@@ -1,19 +1,29 @@
 //! Log files to [`Recording`] (floor 2): recognise the format, choose columns, units and rate, read in one or two streaming passes.
 
-pub mod columns;
-pub mod npy;
-pub mod text;
+mod columns;
+mod npy;
+mod sniff;
+mod text;
 
+use std::io::Read;
+use std::ops::Range;
 use std::path::Path;
 
-use crate::signal::{LogCheck, Recording};
+use sha2::{Digest, Sha256};
+
+use self::columns::{Choice, Head};
+use crate::signal::check::{AxisRange, BackwardStamp, Checker, Outcome, TimeBase};
+use crate::signal::{Axis, Gap, LogCheck, Recording};
 use crate::units::{Quantity, Unit};
+
+pub use crate::signal::check::InputKind;
 
 /// The flags every command that takes LOG has.
 #[derive(Clone, Debug, Default)]
 pub struct LogOptions {
     /// Names or 1-based numbers.
     pub columns: Option<Vec<String>>,
+    /// `NAME`, `NAME:ms`, a 1-based number, or `none`.
     pub time: Option<String>,
     /// Unit of the columns when the header does not say; a flag that contradicts the header is an error.
     pub unit: Option<Unit>,
@@ -26,14 +36,6 @@ pub struct LogOptions {
     pub kind: InputKind,
     /// Prefer this quantity when the log holds both (default angular rate).
     pub quantity: Option<Quantity>,
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum InputKind {
-    #[default]
-    Rate,
-    Increments,
-    Angle,
 }
 
 /// One line: file, line or column, found, expected, what to do.
@@ -61,38 +63,361 @@ pub struct Block {
     pub time_s: Vec<f64>,
 }
 
+/// Rows a table hands out at a time.
+const BLOCK: usize = 4096;
+
+/// Rows of the selected columns as they stand in the file.
+#[derive(Debug, Default)]
+struct Rows {
+    /// Since the first stamp of the file, in the file's unit; empty without a time column.
+    time: Vec<f64>,
+    values: Vec<Vec<f64>>,
+    /// Where each row stands in the file (line or row, from 1).
+    lines: Vec<u64>,
+}
+
+impl Rows {
+    fn clear(&mut self, axes: usize) {
+        self.time.clear();
+        self.lines.clear();
+        self.values.resize_with(axes, Vec::new);
+        self.values.iter_mut().for_each(Vec::clear);
+    }
+}
+
+/// A file of columns, read from the beginning as often as needed.
+trait Table {
+    fn heads(&self) -> &[Head];
+    /// False when the columns have only numbers.
+    fn named(&self) -> bool;
+    /// File and place of the names, for messages.
+    fn place(&self) -> String;
+    fn row_place(&self, line: u64) -> String;
+    fn select(&mut self, time: Option<usize>, axes: &[usize]);
+    fn rewind(&mut self) -> Result<(), InputError>;
+    /// The first stamp of the file, in the file's unit.
+    fn origin(&self) -> f64;
+    /// Up to [`BLOCK`] further rows; false at the end.
+    fn next_rows(&mut self, rows: &mut Rows) -> Result<bool, InputError>;
+}
+
+fn open_table(path: &Path) -> Result<Box<dyn Table + Send>, InputError> {
+    let fail = |what: String| Err(InputError { message: format!("{}: {what}", path.display()) });
+    match std::fs::metadata(path) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return fail("there is no such file".into()),
+        Err(error) => return fail(format!("cannot read: {error}")),
+        Ok(found) if found.is_dir() => return fail("this is a folder, not a log".into()),
+        Ok(found) if !found.is_file() => return fail("a log is read more than once: save it to a file first".into()),
+        Ok(_) => {}
+    }
+    match path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy")) {
+        true => Ok(Box::new(npy::NpyTable::open(path)?)),
+        false => Ok(Box::new(text::TextTable::open(path)?)),
+    }
+}
+
+/// The rows between `--start` and `--end`: from the first row at or after the start to the last before one beyond the end.
+#[derive(Clone, Debug)]
+struct Selection {
+    start_s: f64,
+    end_s: f64,
+    /// Rows of the file seen so far.
+    seen: u64,
+    started: bool,
+}
+
+impl Selection {
+    fn new(options: &LogOptions) -> Self {
+        let (start_s, end_s) = (options.start_s.unwrap_or(f64::NEG_INFINITY), options.end_s.unwrap_or(f64::INFINITY));
+        Selection { start_s, end_s, seen: 0, started: false }
+    }
+    /// The part of a block that is wanted, and whether nothing can follow. `time(i, row)`: seconds of row i of the block,
+    /// which is the given row of the file.
+    fn take(&mut self, rows: usize, time: impl Fn(usize, u64) -> f64) -> (Range<usize>, bool) {
+        let seen = self.seen;
+        self.seen += rows as u64;
+        let mut first = 0;
+        if !self.started {
+            match (0..rows).find(|&i| time(i, seen + i as u64) >= self.start_s) {
+                Some(i) => first = i,
+                None => return (rows..rows, false),
+            }
+            self.started = true;
+        }
+        match (first..rows).find(|&i| time(i, seen + i as u64) > self.end_s) {
+            Some(end) => (first..end, true),
+            None => (first..rows, false),
+        }
+    }
+}
+
+/// An open log with what was decided about it.
+struct Log {
+    table: Box<dyn Table + Send>,
+    choice: Choice,
+    options: LogOptions,
+}
+
+/// What the first pass found.
+struct Scan {
+    check: LogCheck,
+    gaps: Vec<Gap>,
+    /// First sample read, in seconds from the start of the log, and the log's own time there.
+    first_s: f64,
+    start_s: f64,
+}
+
+impl Log {
+    fn open(path: &Path, options: &LogOptions) -> Result<Log, InputError> {
+        let fail = |what: &str| Err(InputError { message: format!("{}: {what}", path.display()) });
+        if options.rate_hz.is_some_and(|rate| !rate.is_finite() || rate <= 0.0) {
+            return fail("--rate must be a positive number of Hz");
+        }
+        if [options.start_s, options.end_s].iter().flatten().any(|t| !t.is_finite() || *t < 0.0) {
+            return fail("--start and --end are seconds from the start of the log, 0 or more");
+        }
+        if let (Some(start), Some(end)) = (options.start_s, options.end_s)
+            && start >= end
+        {
+            return fail("--start must be before --end");
+        }
+        let mut table = open_table(path)?;
+        let (named, place) = (table.named(), table.place());
+        let choice = columns::Table { heads: table.heads(), named, place: &place }.choose(options)?;
+        table.select(choice.time.as_ref().map(|(column, _)| *column), &choice.columns);
+        Ok(Log { table, choice, options: options.clone() })
+    }
+
+    /// Stamps that are used for time.
+    fn stamped(&self) -> bool {
+        self.choice.time.is_some() && self.options.rate_hz.is_none()
+    }
+
+    /// Next wanted rows, stamps in seconds and values in SI; `None` at the end.
+    fn next(&mut self, selection: &mut Selection, rows: &mut Rows) -> Result<Option<(Range<usize>, bool)>, InputError> {
+        if !self.table.next_rows(rows)? {
+            return Ok(None);
+        }
+        if let Some((column, unit)) = &self.choice.time {
+            rows.time.iter_mut().for_each(|t| *t = unit.to_si(*t));
+            if self.stamped()
+                && let Some(empty) = rows.time.iter().position(|t| !t.is_finite())
+            {
+                let head = &self.table.heads()[*column];
+                let place = columns::Table { heads: self.table.heads(), named: self.table.named(), place: "" };
+                return Err(InputError {
+                    message: format!(
+                        "{}, column '{}': the time stamp is empty; choose another with --time{}, or give --rate HZ",
+                        self.table.row_place(rows.lines[empty]),
+                        head.full,
+                        place.other_times(*column)
+                    ),
+                });
+            }
+        }
+        for (column, axis) in rows.values.iter_mut().zip(&self.choice.axes) {
+            column.iter_mut().for_each(|x| *x = axis.unit.to_si(*x));
+        }
+        let stamped = self.stamped();
+        let rate = self.options.rate_hz.unwrap_or(f64::NAN);
+        let time = |i: usize, row: u64| if stamped { rows.time[i] } else { row as f64 / rate };
+        Ok(Some(selection.take(rows.lines.len(), time)))
+    }
+
+    /// The checking pass; `keep` is handed every wanted row.
+    fn scan(&mut self, mut keep: impl FnMut(&Rows, Range<usize>)) -> Result<Scan, InputError> {
+        let mut period = None;
+        loop {
+            let axes = self.choice.axes.iter().map(|a| (a.name.as_str(), &a.unit));
+            let (rate, stamped) = (self.options.rate_hz, self.choice.time.is_some());
+            let mut checker = Checker::new(axes, self.choice.quantity, self.options.kind, rate, stamped, period);
+            let mut selection = Selection::new(&self.options);
+            let mut rows = Rows::default();
+            let mut first_s = 0.0;
+            while let Some((wanted, last)) = self.next(&mut selection, &mut rows)? {
+                if checker.rows() == 0 && !wanted.is_empty() {
+                    let skipped = selection.seen - (rows.lines.len() - wanted.start) as u64;
+                    first_s =
+                        if self.stamped() { rows.time[wanted.start] } else { skipped as f64 / rate.unwrap_or(1.0) };
+                    checker.set_offset(first_s);
+                }
+                if let Err(back) = checker.push(&rows.time, &rows.values, wanted.clone()) {
+                    return Err(self.backward(&back, rows.lines[back.row]));
+                }
+                if period.is_none() {
+                    keep(&rows, wanted);
+                }
+                if last {
+                    break;
+                }
+            }
+            self.enough(checker.rows(), &selection)?;
+            match checker.finish() {
+                Outcome::Done { check, gaps, axes } => {
+                    self.usable(&axes, &check)?;
+                    let origin = self.choice.time.as_ref().map_or(0.0, |(_, unit)| unit.to_si(self.table.origin()));
+                    return Ok(Scan { check, gaps, first_s, start_s: origin + first_s });
+                }
+                Outcome::NoTime => return self.fail("the time stamps do not advance; give --rate HZ to ignore them"),
+                Outcome::Again { period_s } => {
+                    period = Some(period_s);
+                    self.table.rewind()?;
+                }
+            }
+        }
+    }
+
+    fn fail<T>(&self, what: impl std::fmt::Display) -> Result<T, InputError> {
+        Err(InputError { message: format!("{}: {what}", self.table.place()) })
+    }
+
+    fn enough(&self, rows: u64, selection: &Selection) -> Result<(), InputError> {
+        match rows {
+            0 if selection.seen > 0 => self.fail("no sample lies between --start and --end"),
+            0 => self.fail("no rows of numbers"),
+            1 => self.fail("there is only one sample; at least two are needed"),
+            _ => Ok(()),
+        }
+    }
+
+    fn backward(&self, back: &BackwardStamp, line: u64) -> InputError {
+        InputError {
+            message: format!(
+                "{}: time goes back from {:.6} s to {:.6} s after the start of the log; stop before it with --end, or give --rate HZ to ignore the stamps",
+                self.table.row_place(line),
+                back.from_s,
+                back.to_s
+            ),
+        }
+    }
+
+    /// Refuses an axis in which nothing can be analysed.
+    fn usable(&self, axes: &[AxisRange], check: &LogCheck) -> Result<(), InputError> {
+        for (axis, info) in axes.iter().zip(&self.choice.axes) {
+            if axis.usable == 0 {
+                return self.fail(format!("column '{}' holds no number in {} rows", axis.name, check.samples));
+            }
+            if axis.smallest == axis.largest {
+                let value = info.unit.from_si(axis.smallest);
+                return self.fail(format!(
+                    "column '{}' is constant: {value} {} in all {} usable rows; is it the right column?",
+                    axis.name,
+                    info.unit.times_time(0),
+                    axis.usable
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
 /// A log opened for streaming with bounded memory: one checking pass is made at `open`, blocks are then read in a second pass.
 pub struct LogReader {
-    _private: (),
+    log: Log,
+    scan: Scan,
+    sha256: String,
+    selection: Selection,
+    rows: Rows,
+    /// Samples handed out, and gaps passed.
+    index: u64,
+    gap: usize,
+    ended: bool,
 }
 
 impl LogReader {
     pub fn open(path: &Path, options: &LogOptions) -> Result<LogReader, InputError> {
-        let _ = (path, options);
-        todo!()
+        let mut log = Log::open(path, options)?;
+        let scan = log.scan(|_, _| {})?;
+        log.table.rewind()?;
+        let sha256 = sha256(path)?;
+        let selection = Selection::new(options);
+        Ok(LogReader { log, scan, sha256, selection, rows: Rows::default(), index: 0, gap: 0, ended: false })
     }
     pub fn axes(&self) -> &[AxisInfo] {
-        todo!()
+        &self.log.choice.axes
     }
     pub fn quantity(&self) -> Quantity {
-        todo!()
+        self.log.choice.quantity
     }
     /// The check of the whole log (made at open); its `sample_rate_hz` is the rate used.
     pub fn check(&self) -> &LogCheck {
-        todo!()
+        &self.scan.check
     }
+    /// Hex SHA-256 of the file as stored.
     pub fn sha256(&self) -> &str {
-        todo!()
+        &self.sha256
     }
     /// False at the end.
     pub fn next_block(&mut self, block: &mut Block) -> Result<bool, InputError> {
-        let _ = block;
-        todo!()
+        block.missing.clear();
+        block.time_s.clear();
+        block.values.resize_with(self.axes().len(), Vec::new);
+        block.values.iter_mut().for_each(Vec::clear);
+        while !self.ended {
+            let Some((wanted, last)) = self.log.next(&mut self.selection, &mut self.rows)? else {
+                self.ended = true;
+                break;
+            };
+            self.ended = last;
+            if wanted.is_empty() {
+                continue;
+            }
+            for (out, column) in block.values.iter_mut().zip(&self.rows.values) {
+                out.extend_from_slice(&column[wanted.clone()]);
+            }
+            let stamped = self.scan.check.time_base == TimeBase::Stamps;
+            for row in wanted {
+                let gap = self.scan.gaps.get(self.gap).filter(|gap| gap.index as u64 == self.index);
+                self.gap += usize::from(gap.is_some());
+                block.missing.push(gap.map_or(0, |gap| gap.missing));
+                block.time_s.push(if stamped {
+                    self.rows.time[row]
+                } else {
+                    self.scan.first_s + self.index as f64 / self.scan.check.sample_rate_hz
+                });
+                self.index += 1;
+            }
+            return Ok(true);
+        }
+        Ok(false)
     }
 }
 
 /// The whole log in memory with its check.
 pub fn read(path: &Path, options: &LogOptions) -> Result<(Recording, LogCheck), InputError> {
-    let _ = (path, options);
-    todo!()
+    let mut log = Log::open(path, options)?;
+    let mut values: Vec<Vec<f64>> = vec![Vec::new(); log.choice.axes.len()];
+    let scan = log.scan(|rows, wanted| {
+        for (kept, column) in values.iter_mut().zip(&rows.values) {
+            kept.extend_from_slice(&column[wanted.clone()]);
+        }
+    })?;
+    let axes = log.choice.axes.into_iter().zip(values).map(|(info, mut values)| {
+        values.shrink_to_fit();
+        Axis { name: info.name, unit: info.unit, values }
+    });
+    let recording = Recording {
+        name: path.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned()),
+        quantity: log.choice.quantity,
+        sample_rate_hz: scan.check.sample_rate_hz,
+        start_s: scan.start_s,
+        axes: axes.collect(),
+        gaps: scan.gaps,
+        sha256: Some(sha256(path)?),
+    };
+    Ok((recording, scan.check))
+}
+
+/// Hex SHA-256 of the file's bytes as stored.
+fn sha256(path: &Path) -> Result<String, InputError> {
+    let fail = |error: std::io::Error| InputError { message: format!("{}: cannot read: {error}", path.display()) };
+    let mut file = std::fs::File::open(path).map_err(fail)?;
+    let mut hash = Sha256::new();
+    let mut buffer = vec![0u8; 1 << 16];
+    loop {
+        match file.read(&mut buffer).map_err(fail)? {
+            0 => return Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()),
+            n => hash.update(&buffer[..n]),
+        }
+    }
 }

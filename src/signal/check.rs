@@ -1,8 +1,27 @@
 //! The log check: rate and jitter, gaps, repeated or backward stamps, NaN, stuck and saturated values, quantisation step,
 //! motion, outliers; each with count and place. Works in one streaming pass with bounded memory.
+//!
+//! The rules are stated where they are applied: for time in `stamps`, for one axis in `axis`, for whole rows here:
+//! - *Zero row*: every axis exactly 0, more often than the zeros of the single axes would make it (less than 1 in 10⁶).
+//! - *Repeated row*: every axis equal to the row before, in more than 1 % of the rows and over 5 times as often as the single
+//!   axes' repeats would make it: the sensor is slower than the log.
+//!
+//! Nothing is repaired. NaN stays NaN, a gap stays a gap with its number of missing samples, everything else is kept.
+
+mod axis;
+mod robust;
+mod stamps;
+
+use std::ops::Range;
 
 use schemars::JsonSchema;
 use serde::Serialize;
+
+use self::axis::AxisCheck;
+use self::robust::short;
+use self::stamps::{Count, Stamps, Timing, Verdict};
+use super::Gap;
+use crate::units::{Quantity, Unit};
 
 /// How time was established.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
@@ -19,7 +38,8 @@ pub enum TimeBase {
 /// One thing found, with how often and where it is first seen (sample index, 0-based; and seconds from the start).
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Finding {
-    /// Short code: "gap", "repeated-stamp", "backward-stamp", "nan", "stuck", "saturated", "quantised", "motion", "outlier", "jitter", "zero-row" …
+    /// Short code: "jitter", "gap", "repeated-stamp", "backward-stamp", "rate", "zero-row", "repeated-row", "nan", "stuck",
+    /// "saturated", "quantised", "outlier", "motion".
     pub kind: String,
     pub axis: Option<String>,
     pub count: u64,
@@ -44,3 +64,332 @@ pub struct LogCheck {
     pub missing: u64,
     pub findings: Vec<Finding>,
 }
+
+/// What the values of a log are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum InputKind {
+    /// Angular rate or specific force.
+    #[default]
+    Rate,
+    /// Increments over one sample.
+    Increments,
+    /// The running integral.
+    Angle,
+}
+
+/// Where a sample stands: index in what is read, and its stamp in seconds (NaN without stamps).
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    index: u64,
+    time_s: f64,
+}
+
+/// Time that goes back, at this row of the block pushed.
+#[derive(Clone, Copy, Debug)]
+pub struct BackwardStamp {
+    pub row: usize,
+    pub from_s: f64,
+    pub to_s: f64,
+}
+
+/// What is known of one axis after the pass: values in SI.
+#[derive(Clone, Debug)]
+pub struct AxisRange {
+    pub name: String,
+    /// Neither empty nor NaN.
+    pub usable: u64,
+    pub smallest: f64,
+    pub largest: f64,
+}
+
+/// The result of [`Checker::finish`].
+#[derive(Debug)]
+pub enum Outcome {
+    Done {
+        check: LogCheck,
+        gaps: Vec<Gap>,
+        axes: Vec<AxisRange>,
+    },
+    /// The beginning of the log was not typical of its rate: make the pass again with this period, s.
+    Again {
+        period_s: f64,
+    },
+    /// The stamps do not advance.
+    NoTime,
+}
+
+/// The check in the making: push blocks, then finish.
+#[derive(Debug)]
+pub struct Checker {
+    axes: Vec<AxisCheck>,
+    stamps: Option<Stamps>,
+    rate_hz: Option<f64>,
+    /// Seconds from the start of the log to the first sample pushed.
+    offset_s: f64,
+    rows: u64,
+    zero_rows: Count,
+    repeated_rows: Count,
+}
+
+impl Checker {
+    /// `rate_hz`: given by the user, in Hz; stamps are then only looked at. `period_s`: from [`Outcome::Again`].
+    pub fn new<'a>(
+        axes: impl IntoIterator<Item = (&'a str, &'a Unit)>,
+        quantity: Quantity,
+        kind: InputKind,
+        rate_hz: Option<f64>,
+        stamped: bool,
+        period_s: Option<f64>,
+    ) -> Self {
+        Checker {
+            axes: axes.into_iter().map(|(name, unit)| AxisCheck::new(name, unit, quantity, kind)).collect(),
+            stamps: stamped.then(|| Stamps::new(period_s)),
+            rate_hz,
+            offset_s: 0.0,
+            rows: 0,
+            zero_rows: Count::default(),
+            repeated_rows: Count::default(),
+        }
+    }
+
+    /// Samples so far.
+    pub fn rows(&self) -> u64 {
+        self.rows
+    }
+
+    /// Seconds from the start of the log to the first sample, where stamps do not say it.
+    pub fn set_offset(&mut self, seconds: f64) {
+        self.offset_s = seconds;
+    }
+
+    /// These rows of a block: stamps in s (as many as rows, or none) and per axis SI values. Backward time is an error unless
+    /// the rate was given.
+    pub fn push(&mut self, times: &[f64], values: &[Vec<f64>], rows: Range<usize>) -> Result<(), BackwardStamp> {
+        for row in rows {
+            let place = Place { index: self.rows, time_s: times.get(row).copied().unwrap_or(f64::NAN) };
+            if let Some(stamps) = self.stamps.as_mut().filter(|_| place.time_s.is_finite())
+                && let Some(from_s) = stamps.add(place)
+                && self.rate_hz.is_none()
+            {
+                return Err(BackwardStamp { row, from_s, to_s: place.time_s });
+            }
+            self.rows += 1;
+            let (mut zero, mut repeated) = (true, true);
+            for (axis, column) in self.axes.iter_mut().zip(values) {
+                zero &= column[row] == 0.0;
+                repeated &= axis.add(column[row], place);
+            }
+            if zero {
+                self.zero_rows.add(place);
+            }
+            if repeated {
+                self.repeated_rows.add(place);
+            }
+        }
+        Ok(())
+    }
+
+    pub fn finish(self) -> Outcome {
+        let mut notes = Vec::new();
+        let looked = self.stamps.as_ref().map(|stamps| stamps.clone().finish());
+        let (base, rate_hz, timing) = match (self.rate_hz, looked) {
+            (Some(rate), looked) => {
+                if let Some(stamps) = &self.stamps {
+                    overridden(rate, stamps, looked.as_ref(), &mut notes);
+                }
+                (TimeBase::Given, rate, None)
+            }
+            (None, Some(Verdict::LookAgain(period_s))) => return Outcome::Again { period_s },
+            (None, Some(Verdict::Timing(timing))) => {
+                let base = if timing.usable { TimeBase::Stamps } else { TimeBase::MeanRate };
+                (base, 1.0 / timing.period, Some(timing))
+            }
+            (None, None | Some(Verdict::NoTime)) => return Outcome::NoTime,
+        };
+        let clock = Clock { stamped: base == TimeBase::Stamps, rate_hz, offset_s: self.offset_s };
+        let mut findings: Vec<Finding> = notes.into_iter().map(|note| clock.finding(None, note)).collect();
+        if let (Some(timing), Some(stamps)) = (&timing, &self.stamps) {
+            findings.extend(time_notes(timing, stamps, rate_hz, self.rows).into_iter().map(|n| clock.finding(None, n)));
+        }
+        findings.extend(self.row_notes().into_iter().map(|note| clock.finding(None, note)));
+        let mut axes = Vec::with_capacity(self.axes.len());
+        for axis in self.axes {
+            let (smallest, largest) = axis.range;
+            axes.push(AxisRange { name: axis.name.clone(), usable: axis.usable, smallest, largest });
+            let name = axis.name.clone();
+            findings.extend(axis.findings(rate_hz).into_iter().map(|note| clock.finding(Some(&name), note)));
+        }
+        let (jitter_s, gaps) = timing.map_or((0.0, Vec::new()), |t| (t.spread, t.gaps));
+        let missing = gaps.iter().map(|g| g.missing).sum();
+        let span_s = (self.rows + missing) as f64 / rate_hz;
+        let check = LogCheck {
+            samples: self.rows,
+            sample_rate_hz: rate_hz,
+            span_s,
+            time_base: base,
+            jitter_s,
+            missing,
+            findings,
+        };
+        Outcome::Done { check, gaps, axes }
+    }
+
+    fn row_notes(&self) -> Vec<Note> {
+        let mut notes = Vec::new();
+        let rows = self.rows as f64;
+        if self.axes.len() < 2 {
+            return notes; // one axis cannot be told from its own values
+        }
+        if let Count { count, first: Some(first) } = self.zero_rows {
+            let others = rows - count as f64;
+            let by_chance: f64 =
+                others * self.axes.iter().map(|a| (a.zeros - count) as f64 / others.max(1.0)).product::<f64>();
+            if unlikely(count as f64, by_chance) {
+                notes.push(Note {
+                    kind: "zero-row",
+                    count,
+                    first: Some(first),
+                    message: format!("{count} of {} rows are zero on every axis; kept", self.rows),
+                    serious: count > 2 && count as f64 > 1e-3 * rows,
+                });
+            }
+        }
+        if let Count { count, first: Some(first) } = self.repeated_rows {
+            let by_chance: f64 = rows * self.axes.iter().map(|a| a.repeats as f64 / rows).product::<f64>();
+            if count as f64 > 0.01 * rows && count as f64 > 5.0 * by_chance {
+                notes.push(Note {
+                    kind: "repeated-row",
+                    count,
+                    first: Some(first),
+                    message: format!(
+                        "{count} of {} rows repeat the row before on every axis: the sensor is slower than the log; kept",
+                        self.rows
+                    ),
+                    serious: count as f64 > 0.1 * rows,
+                });
+            }
+        }
+        notes
+    }
+}
+
+/// A finding before its place is put into words; no place if it is about the whole log.
+struct Note {
+    kind: &'static str,
+    count: u64,
+    first: Option<Place>,
+    message: String,
+    serious: bool,
+}
+
+/// Seconds from the start of the log of a sample.
+struct Clock {
+    stamped: bool,
+    rate_hz: f64,
+    offset_s: f64,
+}
+
+impl Clock {
+    /// The note with its place in words.
+    fn finding(&self, axis: Option<&str>, note: Note) -> Finding {
+        let first = note.first.unwrap_or(Place { index: 0, time_s: f64::NAN });
+        let by_stamp = self.stamped && first.time_s.is_finite();
+        let first_s = if by_stamp { first.time_s } else { self.offset_s + first.index as f64 / self.rate_hz };
+        let axis_name = axis.map(|name| format!("{name}: ")).unwrap_or_default();
+        let place = match note.first {
+            Some(first) => format!("; first at sample {} ({} s)", first.index, short(first_s)),
+            None => String::new(),
+        };
+        let message = format!("{axis_name}{}{place}", note.message);
+        Finding {
+            kind: note.kind.to_string(),
+            axis: axis.map(str::to_string),
+            count: note.count,
+            first_index: first.index,
+            first_s,
+            message,
+            serious: note.serious,
+        }
+    }
+}
+
+/// Notes about stamps that decide the rate.
+fn time_notes(timing: &Timing, stamps: &Stamps, rate_hz: f64, rows: u64) -> Vec<Note> {
+    let mut notes = Vec::new();
+    if !timing.usable {
+        let message = format!(
+            "the steps of the time stamps are too uneven for the sensor's clock (longest {} s, mean {} s): their mean rate {} Hz is used, and gaps cannot be seen",
+            short(stamps.longest),
+            short(timing.period),
+            short(rate_hz)
+        );
+        notes.push(Note { kind: "jitter", count: rows, first: None, message, serious: false });
+    } else if timing.spread > 0.05 * timing.period {
+        let percent = short(100.0 * timing.spread / timing.period);
+        let message = format!("time steps scatter by {} s, {percent} % of the period", short(timing.spread));
+        notes.push(Note { kind: "jitter", count: rows, first: None, message, serious: false });
+    }
+    if let Some(gap) = timing.gaps.first() {
+        let missing: u64 = timing.gaps.iter().map(|g| g.missing).sum();
+        let count = timing.gaps.len() as u64;
+        let message = format!(
+            "{count} {}, {missing} samples missing, the longest step {} s; left open",
+            if count == 1 { "gap" } else { "gaps" },
+            short(timing.longest_gap)
+        );
+        let first = Place { index: gap.index as u64, time_s: timing.first_gap_s };
+        notes.push(Note {
+            kind: "gap",
+            count,
+            first: Some(first),
+            message,
+            serious: missing as f64 > 0.1 * rows as f64,
+        });
+    }
+    repeated(stamps, rows, &mut notes);
+    notes
+}
+
+fn repeated(stamps: &Stamps, rows: u64, notes: &mut Vec<Note>) {
+    if let Count { count, first: Some(first) } = stamps.repeated {
+        let message = format!("{count} rows have the time stamp of the row before; kept, evenly spaced");
+        notes.push(Note {
+            kind: "repeated-stamp",
+            count,
+            first: Some(first),
+            message,
+            serious: count as f64 > 0.01 * rows as f64,
+        });
+    }
+}
+
+/// Notes about stamps that a given rate replaces.
+fn overridden(rate_hz: f64, stamps: &Stamps, looked: Option<&Verdict>, notes: &mut Vec<Note>) {
+    let stamped = match looked {
+        Some(Verdict::Timing(timing)) => 1.0 / timing.period,
+        _ => 1.0 / stamps.mean_period(),
+    };
+    if stamped.is_finite() && (stamped / rate_hz - 1.0).abs() > 0.01 && stamps.backward.count == 0 {
+        let message =
+            format!("the rate given, {} Hz, replaces the {} Hz of the time stamps", short(rate_hz), short(stamped));
+        notes.push(Note { kind: "rate", count: 1, first: None, message, serious: true });
+    }
+    if let Count { count, first: Some(first) } = stamps.backward {
+        let message =
+            format!("time goes back {count} {}; the stamps are not used", if count == 1 { "time" } else { "times" });
+        notes.push(Note { kind: "backward-stamp", count, first: Some(first), message, serious: false });
+    }
+    if let Count { count, first: Some(first) } = stamps.repeated {
+        let message = format!("{count} rows have the time stamp of the row before; the stamps are not used");
+        notes.push(Note { kind: "repeated-stamp", count, first: Some(first), message, serious: false });
+    }
+}
+
+/// True if a Poisson count of this mean would be so large in less than one of 10⁶ cases (Chernoff's bound).
+fn unlikely(count: f64, mean: f64) -> bool {
+    count > mean && (mean == 0.0 || count - mean - count * (count / mean).ln() < 1e-6f64.ln())
+}
+
+#[cfg(test)]
+#[path = "check/tests.rs"]
+mod tests;

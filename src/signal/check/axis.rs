@@ -1,0 +1,423 @@
+//! One axis: NaN, stuck and saturated values, quantisation, outliers, motion.
+//!
+//! Rules, for the values of a rate or of increments, and for the differences of an integral:
+//! - *Outlier*: in windows of 1000 samples, further than 8 robust standard deviations (1.4826 × median absolute deviation)
+//!   from the window's median. A window with more than 1 % of such values is not an accident but motion.
+//! - *Stuck*: a run of equal values so long that, with the share p of repeats in this log, chance would make one in less
+//!   than 1 of 10⁶ such logs (p^(length − 1) · n < 10⁻⁶), and at least 4.
+//! - *Saturated*: the extreme value occurs at least 5 times, over 3 times as often as the next value inside, and lies more
+//!   than 2 robust standard deviations from the median.
+//! - *Quantised*: 99 % of the distances between neighbouring distinct values are multiples (within 5 %) of one step, and the
+//!   step is at least 1 % of the noise.
+//! - *Motion*: standard deviation in windows (64 samples or more) over 3 times its median; or the means of the windows
+//!   spread (5 % to 95 %) over more than 3 deg/s or 0.5 m/s²; or a mean rate above 25 deg/s.
+
+use std::collections::BTreeMap;
+
+use super::robust::{Sample, median, median_and_spread, quantile, short};
+use super::stamps::Count;
+use super::{InputKind, Note, Place};
+use crate::numerics::reduce::Moments;
+use crate::units::{Quantity, Unit};
+
+const WINDOW: usize = 1000;
+const SHORTEST_WINDOW: usize = 50;
+const OUTLIER: f64 = 8.0;
+const REST_WINDOW: u64 = 64;
+const REST_WINDOWS: usize = 4096;
+
+/// A value at one end of the range, how often, and how often the next one inside.
+#[derive(Clone, Debug)]
+struct Extreme {
+    value: f64,
+    count: Count,
+    inner: f64,
+    inner_count: u64,
+}
+
+impl Extreme {
+    fn new() -> Self {
+        Extreme { value: f64::NEG_INFINITY, count: Count::default(), inner: f64::NEG_INFINITY, inner_count: 0 }
+    }
+    /// Takes the largest; the smallest is found with the sign turned.
+    fn add(&mut self, x: f64, place: Place) {
+        if x > self.value {
+            (self.inner, self.inner_count) = (self.value, self.count.count);
+            (self.value, self.count) = (x, Count::default());
+            self.count.add(place);
+        } else if x == self.value {
+            self.count.add(place);
+        } else if x > self.inner {
+            (self.inner, self.inner_count) = (x, 1);
+        } else if x == self.inner {
+            self.inner_count += 1;
+        }
+    }
+}
+
+/// Moments of consecutive windows; neighbours are merged when there are too many.
+#[derive(Clone, Debug)]
+struct Windows {
+    size: u64,
+    done: Vec<(Moments, Place)>,
+    open: Moments,
+    start: Option<Place>,
+}
+
+impl Windows {
+    fn add(&mut self, x: f64, place: Place) {
+        let start = *self.start.get_or_insert(place);
+        self.open.add(x);
+        if self.open.count == self.size {
+            self.done.push((std::mem::take(&mut self.open), start));
+            self.start = None;
+            if self.done.len() == REST_WINDOWS {
+                self.size *= 2;
+                let merged = self.done.chunks_exact(2).map(|pair| {
+                    let mut moments = pair[0].0;
+                    moments.merge(&pair[1].0);
+                    (moments, pair[0].1)
+                });
+                self.done = merged.collect();
+            }
+        }
+    }
+}
+
+/// Streaming check of one axis.
+#[derive(Clone, Debug)]
+pub(super) struct AxisCheck {
+    pub(super) name: String,
+    unit: Unit,
+    quantity: Quantity,
+    kind: InputKind,
+    pub(super) nan: Count,
+    pub(super) usable: u64,
+    /// Smallest and largest raw value.
+    pub(super) range: (f64, f64),
+    pub(super) zeros: u64,
+    pub(super) repeats: u64,
+    previous: Option<f64>,
+    run: (u64, Option<Place>),
+    runs: BTreeMap<u64, Count>,
+    top: Extreme,
+    bottom: Extreme,
+    sample: Sample,
+    window: Vec<(f64, Place)>,
+    scratch: Vec<f64>,
+    outliers: Count,
+    largest_outlier: f64,
+    disturbed: Count,
+    rest: Windows,
+}
+
+impl AxisCheck {
+    pub(super) fn new(name: &str, unit: &Unit, quantity: Quantity, kind: InputKind) -> Self {
+        AxisCheck {
+            name: name.to_string(),
+            unit: unit.times_time(0), // the physical unit: 1/131 deg/s is shown in deg/s
+            quantity,
+            kind,
+            nan: Count::default(),
+            usable: 0,
+            range: (f64::INFINITY, f64::NEG_INFINITY),
+            zeros: 0,
+            repeats: 0,
+            previous: None,
+            run: (0, None),
+            runs: BTreeMap::new(),
+            top: Extreme::new(),
+            bottom: Extreme::new(),
+            sample: Sample::new(1 << 14),
+            window: Vec::with_capacity(WINDOW),
+            scratch: Vec::with_capacity(WINDOW),
+            outliers: Count::default(),
+            largest_outlier: 0.0,
+            disturbed: Count::default(),
+            rest: Windows { size: REST_WINDOW, done: Vec::new(), open: Moments::default(), start: None },
+        }
+    }
+
+    /// The next value (SI); true if it equals the one before.
+    pub(super) fn add(&mut self, value: f64, place: Place) -> bool {
+        if !value.is_finite() {
+            self.nan.add(place);
+            self.end_run();
+            self.previous = None;
+            return false;
+        }
+        self.usable += 1;
+        self.range = (self.range.0.min(value), self.range.1.max(value));
+        self.zeros += u64::from(value == 0.0);
+        let previous = self.previous.replace(value);
+        let repeated = previous == Some(value);
+        if repeated {
+            self.repeats += 1;
+            self.run.0 += 1;
+        } else {
+            self.end_run();
+            self.run = (1, Some(place));
+        }
+        match (self.kind, previous) {
+            (InputKind::Angle, Some(previous)) => self.look(value - previous, place),
+            (InputKind::Angle, None) => {}
+            _ => {
+                self.top.add(value, place);
+                self.bottom.add(-value, place);
+                self.look(value, place);
+            }
+        }
+        repeated
+    }
+
+    fn end_run(&mut self) {
+        if let (length @ 3.., Some(place)) = self.run {
+            self.runs.entry(length).or_default().add(place);
+        }
+        self.run = (0, None);
+    }
+
+    fn look(&mut self, x: f64, place: Place) {
+        self.sample.add(x);
+        self.rest.add(x, place);
+        self.window.push((x, place));
+        if self.window.len() == WINDOW {
+            self.close_window();
+        }
+    }
+
+    fn close_window(&mut self) {
+        self.scratch.clear();
+        self.scratch.extend(self.window.iter().map(|(x, _)| *x));
+        let (center, mut spread) = median_and_spread(&mut self.scratch);
+        if spread == 0.0 {
+            // more than half are equal: measure in steps of the values
+            spread = self.scratch.iter().copied().filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
+        }
+        let bound = OUTLIER * spread;
+        let far = self.window.iter().filter(|(x, _)| (x - center).abs() > bound);
+        if far.clone().count() * 100 > self.window.len() {
+            self.disturbed.add(self.window[0].1);
+        } else {
+            for (x, place) in far {
+                self.outliers.add(*place);
+                if (x - center).abs() > self.largest_outlier.abs() {
+                    self.largest_outlier = x - center;
+                }
+            }
+        }
+        self.window.clear();
+    }
+
+    /// `12.3 deg/s`
+    fn show(&self, x: f64) -> String {
+        format!("{} {}", short(self.unit.from_si(x)), self.unit)
+    }
+
+    pub(super) fn findings(mut self, rate_hz: f64) -> Vec<Note> {
+        self.end_run();
+        if self.window.len() >= SHORTEST_WINDOW {
+            self.close_window();
+        }
+        let mut sample = self.sample.values();
+        let step = quantisation_step(&mut sample);
+        let (center, noise) = self.noise(&mut sample);
+        let mut out = Vec::new();
+        self.nan_finding(&mut out);
+        self.stuck(step, noise, &mut out);
+        self.saturated(center, noise, &mut out);
+        self.quantised(step, noise, &mut out);
+        self.outlier(&mut out);
+        self.motion(rate_hz, &mut out);
+        out
+    }
+
+    /// Median, and the robust noise: the median standard deviation of the windows, else the spread of all.
+    fn noise(&self, sample: &mut [f64]) -> (f64, f64) {
+        let (center, spread) = median_and_spread(sample);
+        let mut deviations: Vec<f64> = self.rest.done.iter().map(|(m, _)| m.variance().sqrt()).collect();
+        if deviations.len() < 3 { (center, spread) } else { (center, median(&mut deviations)) }
+    }
+
+    fn nan_finding(&self, out: &mut Vec<Note>) {
+        let Count { count, first: Some(first) } = self.nan else { return };
+        out.push(Note {
+            kind: "nan",
+            count,
+            first: Some(first),
+            message: format!(
+                "{count} {} empty or not a number; skipped, not replaced",
+                are(count, "value is", "values are")
+            ),
+            serious: count * 100 > self.usable + count,
+        });
+    }
+
+    fn stuck(&self, step: Option<f64>, noise: f64, out: &mut Vec<Note>) {
+        let total = self.usable as f64;
+        let share = self.repeats as f64 / total;
+        if share <= 0.0 || share >= 1.0 || step.is_some_and(|step| step > 2.0 * noise && share < 0.999) {
+            return; // where the steps are coarser than the noise, equal values are the rule
+        }
+        let shortest = (1.0 + (1e6 * total).ln() / -share.ln()).ceil().max(4.0);
+        let long = self.runs.iter().filter(|(length, _)| **length as f64 >= shortest);
+        let (mut runs, mut samples, mut longest, mut first) = (0, 0, 0, None::<Place>);
+        for (length, count) in long {
+            runs += count.count;
+            samples += length * count.count;
+            longest = longest.max(*length);
+            first = [first, count.first].into_iter().flatten().min_by_key(|p| p.index);
+        }
+        if let Some(first) = first {
+            out.push(Note {
+                kind: "stuck",
+                count: samples,
+                first: Some(first),
+                message: format!(
+                    "{samples} samples in {runs} {} of equal values, the longest {longest}; chance explains runs up to {}",
+                    are(runs, "run", "runs"),
+                    shortest - 1.0
+                ),
+                serious: samples as f64 > 1e-3 * total,
+            });
+        }
+    }
+
+    fn saturated(&self, center: f64, noise: f64, out: &mut Vec<Note>) {
+        for (end, sign, word) in [(&self.top, 1.0, "largest"), (&self.bottom, -1.0, "smallest")] {
+            let Count { count, first: Some(first) } = end.count else { continue };
+            let far = (sign * end.value - center).abs() > 2.0 * noise;
+            if count >= 5 && count > 3 * end.inner_count && far && self.range.0 < self.range.1 {
+                let value = self.show(sign * end.value);
+                out.push(Note {
+                    kind: "saturated",
+                    count,
+                    first: Some(first),
+                    message: format!(
+                        "{count} samples stand at the {word} value {value} ({} at the next one): the sensor was at its limit",
+                        end.inner_count
+                    ),
+                    serious: true,
+                });
+            }
+        }
+    }
+
+    fn quantised(&self, step: Option<f64>, noise: f64, out: &mut Vec<Note>) {
+        let Some(step) = step.filter(|step| *step >= 0.01 * noise) else { return };
+        let coarse = step > 2.0 * noise;
+        let share = if noise > 0.0 { format!(", {} of the noise", short(step / noise)) } else { String::new() };
+        let meaning = if coarse { ": the noise is hidden below the steps, and its density cannot be read" } else { "" };
+        out.push(Note {
+            kind: "quantised",
+            count: self.usable,
+            first: None,
+            message: format!("values come in steps of {}{share}{meaning}", self.show(step)),
+            serious: coarse,
+        });
+    }
+
+    fn outlier(&self, out: &mut Vec<Note>) {
+        let Count { count, first: Some(first) } = self.outliers else { return };
+        out.push(Note {
+            kind: "outlier",
+            count,
+            first: Some(first),
+            message: format!(
+                "{count} {} more than {OUTLIER} robust standard deviations from the samples around, the furthest by {}; kept",
+                are(count, "sample lies", "samples lie"),
+                self.show(self.largest_outlier)
+            ),
+            serious: count as f64 > 1e-4 * self.usable as f64,
+        });
+    }
+
+    fn motion(&self, rate_hz: f64, out: &mut Vec<Note>) {
+        let windows = &self.rest.done;
+        if windows.len() < 3 {
+            return;
+        }
+        // increments and differences of an integral are one period long
+        let to_rate = if self.kind == InputKind::Rate { 1.0 } else { rate_hz };
+        let show = |x: f64| format!("{} {}", short(self.rate_unit().from_si(x * to_rate)), self.rate_unit());
+        let mut deviations: Vec<f64> = windows.iter().map(|(m, _)| m.variance().sqrt()).collect();
+        let largest = deviations.iter().copied().fold(0.0, f64::max);
+        let usual = median(&mut deviations);
+        let moving: Vec<&(Moments, Place)> =
+            windows.iter().filter(|(m, _)| usual > 0.0 && m.variance().sqrt() > 3.0 * usual).collect();
+        let mut means: Vec<f64> = windows.iter().map(|(m, _)| m.mean).collect();
+        means.sort_unstable_by(f64::total_cmp);
+        let spread = quantile(&means, 0.95) - quantile(&means, 0.05);
+        let (most_spread, most_mean) = match self.quantity {
+            Quantity::AngularRate => (3f64.to_radians(), 25f64.to_radians()),
+            Quantity::SpecificForce => (0.5, f64::INFINITY),
+        };
+        let mean = means.iter().sum::<f64>() / means.len() as f64;
+        let seconds = self.rest.size as f64 / rate_hz;
+        let finding = |count: u64, first: Option<Place>, what: String| Note {
+            kind: "motion",
+            count,
+            first,
+            message: format!("not at rest: {what}"),
+            serious: true,
+        };
+        if let Some((_, first)) = moving.first() {
+            let what = format!(
+                "in {} of {} windows of {} s the values scatter over 3 times as much as usual (up to {}, usually {})",
+                moving.len(),
+                windows.len(),
+                short(seconds),
+                show(largest),
+                show(usual)
+            );
+            out.push(finding(moving.len() as u64 * self.rest.size, Some(*first), what));
+        } else if spread * to_rate > most_spread {
+            let what = format!("the means over {} s spread over {}", short(seconds), show(spread));
+            out.push(finding(self.usable, None, what));
+        } else if mean.abs() * to_rate > most_mean {
+            out.push(finding(self.usable, None, format!("the mean is {}", show(mean))));
+        } else if let Count { count, first: Some(first) } = self.disturbed {
+            let what = format!("{count} windows of {WINDOW} samples hold more than 1 % of far values");
+            out.push(finding(count * WINDOW as u64, Some(first), what));
+        }
+    }
+
+    fn rate_unit(&self) -> Unit {
+        if self.kind == InputKind::Rate { self.unit.clone() } else { self.unit.times_time(-2) }
+    }
+}
+
+fn are<'a>(count: u64, one: &'a str, many: &'a str) -> &'a str {
+    if count == 1 { one } else { many }
+}
+
+/// The step of which all values are multiples, apart from an offset and from rounding in print; `None` if there is none.
+fn quantisation_step(sample: &mut [f64]) -> Option<f64> {
+    sample.sort_unstable_by(f64::total_cmp);
+    let spread = quantile(sample, 0.75) - quantile(sample, 0.25);
+    let range = sample.last()? - sample.first()?;
+    // closer values differ by the arithmetic that made them, not by the sensor
+    let same = 1e-6 * if spread > 0.0 { spread } else { range };
+    let gaps: Vec<f64> = sample.windows(2).map(|w| w[1] - w[0]).filter(|gap| *gap > same).collect();
+    if gaps.len() < 3 || gaps.len() * 2 > sample.len() {
+        return None; // too few levels to tell, or hardly any value twice
+    }
+    let smallest = gaps.iter().copied().fold(f64::INFINITY, f64::min);
+    let (mut total, mut steps, mut fits) = (0.0, 0.0, 0);
+    for gap in &gaps {
+        let multiple = (gap / smallest).round();
+        // a wide gap carries the rounding of the smallest one many times: it says nothing
+        if multiple > 20.0 || (gap / smallest - multiple).abs() <= 0.05 {
+            fits += 1;
+            if multiple <= 20.0 {
+                total += gap;
+                steps += multiple;
+            }
+        }
+    }
+    (fits * 100 >= gaps.len() * 99).then_some(total / steps)
+}
+
+#[cfg(test)]
+#[path = "axis_tests.rs"]
+mod tests;

@@ -1,5 +1,9 @@
 //! One integration binary, one file per room or concern.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking, helpers too")]
+#![allow(clippy::print_stdout, reason = "a skipped test says so")]
+#![allow(unreachable_pub, reason = "modules of one binary share the support module")]
+
 mod allan;
 mod architecture;
 mod bad_input;

@@ -181,9 +181,21 @@ fn nees_data() -> Nees {
         title: "gyro_x: NEES over 50 runs".into(),
         nees: nees.collect(),
         time_s: (0..500).map(|i| f64::from(i) * 1.2).collect(),
-        lower: 1.484,
-        upper: 2.591,
+        lower: vec![1.484; 500],
+        upper: vec![2.591; 500],
         expected: 2.0,
+        band_label: "95 % at one time".into(),
+    }
+}
+
+fn nees_at_five_times() -> Nees {
+    Nees {
+        title: "gyro_x: NEES over 100 runs".into(),
+        time_s: vec![0.0, 1.0, 10.0, 100.0, 600.0],
+        nees: vec![1.04, 0.93, 1.11, 0.97, 1.02],
+        lower: vec![0.74; 5],
+        upper: vec![1.29; 5],
+        expected: 1.0,
         band_label: "95 % at one time".into(),
     }
 }
@@ -199,6 +211,7 @@ fn gallery() -> Vec<(&'static str, String)> {
         ("nis", nis_histogram(&histogram_data())),
         ("periodogram", cumulative_periodogram(&periodogram_data())),
         ("nees", nees(&nees_data())),
+        ("nees5", nees(&nees_at_five_times())),
     ]
 }
 
@@ -228,7 +241,7 @@ fn page() -> Page {
                 )
                 .warning("A gap of 2.4 s at 1312 s was propagated over."),
             Section::new("gyro_x").figures(figures(&["estimate", "innovations", "autocorrelation", "nis", "periodogram"])),
-            Section::new("Design").figures(figures(&["allan", "sigma", "budget", "nees"])).list(vec!["One sentence.".into(), "Another sentence.".into()]),
+            Section::new("Design").figures(figures(&["allan", "sigma", "budget", "nees", "nees5"])).list(vec!["One sentence.".into(), "Another sentence.".into()]),
         ],
     }
 }
@@ -236,6 +249,60 @@ fn page() -> Page {
 fn save(name: &str, content: &str) {
     if let Some(dir) = std::env::var_os("KFDESIGN_GALLERY") {
         std::fs::write(std::path::Path::new(&dir).join(name), content).unwrap();
+    }
+}
+
+/// Opening and closing tags match, attributes are quoted, no stray special character.
+fn assert_well_formed(svg: &str, name: &str) {
+    let mut open: Vec<&str> = vec![];
+    let mut rest = svg;
+    while let Some(start) = rest.find('<') {
+        assert!(
+            !rest[..start].contains('>') || open.last() == Some(&"style"),
+            "{name}: stray > in {:?}",
+            &rest[..start]
+        );
+        let end = rest[start..].find('>').unwrap() + start;
+        let tag = &rest[start + 1..end];
+        match tag.strip_prefix('/') {
+            Some(closing) => assert_eq!(open.pop(), Some(closing), "{name}"),
+            None => {
+                assert_eq!(tag.matches('"').count() % 2, 0, "{name}: {tag}");
+                if !tag.ends_with('/') {
+                    open.push(tag.split_whitespace().next().unwrap());
+                }
+            }
+        }
+        rest = &rest[end + 1..];
+    }
+    assert!(open.is_empty(), "{name}: {open:?}");
+    let raw_ampersand = svg
+        .split('&')
+        .skip(1)
+        .any(|after| !after.split(';').next().unwrap_or("").chars().all(|c| c.is_ascii_alphanumeric() || c == '#'));
+    assert!(!raw_ampersand, "{name}");
+}
+
+/// Every number in geometric attributes, with the size of the figure in the same units.
+fn assert_inside(svg: &str, name: &str) {
+    let view = svg.split("viewBox=\"0 0 ").nth(1).unwrap().split('"').next().unwrap();
+    let (width, height) = view.split_once(' ').unwrap();
+    let (width, height): (f64, f64) = (width.parse().unwrap(), height.parse().unwrap());
+    let body = svg.split("</style>").nth(1).unwrap();
+    for (keys, most) in [([" x", " x1", " x2", " cx"], width), ([" y", " y1", " y2", " cy"], height)] {
+        for key in keys {
+            for value in body.split(&format!("{key}=\"")).skip(1) {
+                let value: f64 = value.split('"').next().unwrap().parse().unwrap();
+                assert!((0.0..=most).contains(&value), "{name}: {key}={value}");
+            }
+        }
+    }
+    for points in body.split(" points=\"").skip(1) {
+        for pair in points.split('"').next().unwrap().split_whitespace() {
+            let (x, y) = pair.split_once(',').unwrap();
+            let (x, y): (f64, f64) = (x.parse().unwrap(), y.parse().unwrap());
+            assert!((0.0..=width).contains(&x) && (0.0..=height).contains(&y), "{name}: {pair}");
+        }
     }
 }
 
@@ -251,8 +318,185 @@ fn figures_are_self_contained_and_accessible() {
         for alien in ["#", "font-family", "opacity=", "href", "url(", "NaN", "inf"] {
             assert!(!body.contains(alien), "{name}: {alien}");
         }
+        assert_well_formed(&svg, name);
+        assert_inside(&svg, name);
     }
-    save("sheet.svg", &sheet("rest.csv", &[allan(&allan_data("gyro_x", 1)), allan(&allan_data("gyro_y", 2))]));
+    assert_eq!(gallery(), gallery());
+}
+
+#[test]
+fn sheet_stacks_figures_under_one_style() {
+    let one = allan(&allan_data("gyro_x", 1));
+    let svg = sheet("rest.csv", &[one.clone(), allan(&allan_data("gyro_y", 2))]);
+    save("sheet.svg", &svg);
+    assert_well_formed(&svg, "sheet");
+    assert_eq!(svg.matches("<style>").count(), 1);
+    let height =
+        |svg: &str| -> i32 { svg.split(" height=\"").nth(1).unwrap().split('"').next().unwrap().parse().unwrap() };
+    assert_eq!(height(&svg), 2 * height(&one));
+    assert!(svg.contains(&format!("<svg y=\"{}\"", height(&one))));
+}
+
+/// The dot of a known value stands over, or beside, the tick label of that value.
+#[test]
+fn dots_stand_where_their_values_say() {
+    let points: Vec<AllanPoint> = [(0.1, 1e-4), (1.0, 3e-5), (10.0, 1e-5), (100.0, 2e-5)]
+        .map(|(tau_s, deviation)| AllanPoint {
+            tau_s,
+            deviation,
+            lower: deviation,
+            upper: deviation,
+            noise: String::new(),
+        })
+        .to_vec();
+    let svg = allan(&Allan { unit: "rad/s".into(), points, ..Allan::default() });
+    let attribute = |line: &str, key: &str| -> f64 {
+        line.split(&format!(" {key}=\"")).nth(1).unwrap().split('"').next().unwrap().parse().unwrap()
+    };
+    let dots: Vec<(f64, f64)> =
+        svg.lines().filter(|l| l.contains("<circle")).map(|l| (attribute(l, "cx"), attribute(l, "cy"))).collect();
+    // the first is the sample in the legend or the last one: four belong to the data
+    let dots = &dots[dots.len() - 4..];
+    let lines: Vec<&str> = svg.lines().collect();
+    let label = |words: &str| -> (f64, f64) {
+        let at = lines.iter().position(|l| *l == words).unwrap_or_else(|| panic!("no label {words}"));
+        (attribute(lines[at - 1], "x"), attribute(lines[at - 1], "y"))
+    };
+    for (dot, words) in dots.iter().zip(["0.1", "1", "10", "100"]) {
+        assert!((dot.0 - label(words).0).abs() <= 1.0, "{words}");
+    }
+    assert!((dots[0].1 - label("10⁻⁴").1).abs() <= 1.0);
+    assert!((dots[2].1 - label("10⁻⁵").1).abs() <= 1.0);
+    // equal ratios are equal distances, upwards is larger
+    let down = |i: usize, j: usize| dots[j].1 - dots[i].1;
+    assert!((down(1, 2) / down(0, 2) - 3f64.log10()).abs() < 2e-3);
+    assert!(down(3, 2) > 0.0);
+}
+
+#[test]
+fn hostile_values_make_a_figure_all_the_same() {
+    let odd = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0, -1.0, 1e300, 1e-300, 5.0, 5.0];
+    let cases: Vec<Vec<f64>> = vec![vec![], vec![1.0], vec![0.0; 3], vec![f64::NAN; 4], odd.to_vec(), {
+        let mut reversed = odd.to_vec();
+        reversed.reverse();
+        reversed
+    }];
+    for values in &cases {
+        let pairs: Vec<(f64, f64)> = values.iter().copied().zip(values.iter().rev().copied()).collect();
+        let curve = Curve { label: "any".into(), points: pairs.clone() };
+        let points = pairs.iter().map(|&(tau_s, deviation)| AllanPoint {
+            tau_s,
+            deviation,
+            lower: -deviation,
+            upper: deviation * 2.0,
+            noise: "white".into(),
+        });
+        let figures = [
+            allan(&Allan {
+                points: points.collect(),
+                total: Some(curve.clone()),
+                components: vec![curve.clone(); 8],
+                ..Allan::default()
+            }),
+            sigma(&Sigma {
+                time_s: values.clone(),
+                states: values
+                    .iter()
+                    .map(|&v| SigmaState { name: "s".into(), sigma: values.clone(), steady: Some(v) })
+                    .collect(),
+                settling_time_s: values.first().copied(),
+                ..Sigma::default()
+            }),
+            error_budget(
+                "budget",
+                &values
+                    .iter()
+                    .map(|&share| BudgetItem { source: "s".into(), share, value: String::new() })
+                    .collect::<Vec<_>>(),
+            ),
+            estimate(&Estimate {
+                time_s: values.clone(),
+                estimate: values.clone(),
+                sigma: values.clone(),
+                truth: Some(curve),
+                ..Estimate::default()
+            }),
+            innovations(&Innovations {
+                time_s: values.clone(),
+                lower: values.clone(),
+                upper: values.clone(),
+                ..Innovations::default()
+            }),
+            autocorrelation(&Autocorrelation {
+                points: pairs.clone(),
+                bound: values.first().copied().unwrap_or(0.0),
+                ..Autocorrelation::default()
+            }),
+            nis_histogram(&Histogram {
+                edges: values.clone(),
+                observed: values.clone(),
+                expected: values.clone(),
+                ..Histogram::default()
+            }),
+            cumulative_periodogram(&Periodogram {
+                points: pairs,
+                half_width: values.first().copied().unwrap_or(0.1),
+                ..Periodogram::default()
+            }),
+            nees(&Nees {
+                time_s: values.clone(),
+                nees: values.clone(),
+                lower: values.clone(),
+                upper: values.clone(),
+                expected: values.first().copied().unwrap_or(1.0),
+                ..Nees::default()
+            }),
+        ];
+        for (number, svg) in figures.iter().enumerate() {
+            let name = format!("figure {number} of {values:?}");
+            assert_well_formed(svg, &name);
+            assert_inside(svg, &name);
+        }
+    }
+}
+
+#[test]
+fn a_million_points_stay_a_small_file() {
+    let n = 1_000_000;
+    let time_s: Vec<f64> = (0..n).map(|i| f64::from(i) * 0.01).collect();
+    let value = Normals(4).take(n as usize);
+    let svg = estimate(&Estimate { sigma: vec![1.0; n as usize], estimate: value, time_s, ..Estimate::default() });
+    assert!(svg.len() < 200_000, "{} bytes", svg.len());
+}
+
+#[test]
+fn words_from_a_log_cannot_become_markup() {
+    let evil = "<script>alert('1')</script>&\"\u{1}";
+    let mut data = allan_data(evil, 1);
+    data.unit = evil.into();
+    data.components[0].label = evil.into();
+    let svg = allan(&data);
+    assert!(!svg.contains("<script") && !svg.contains('\u{1}'));
+    assert_well_formed(&svg, "evil");
+    let page = Page {
+        title: evil.into(),
+        subtitle: evil.into(),
+        badge: Some(Badge::new(Verdict::Inconclusive, evil)),
+        provenance: vec![(evil.into(), evil.into())],
+        sections: vec![
+            Section::new(evil)
+                .paragraph(evil)
+                .warning(evil)
+                .list(vec![evil.into()])
+                .table(evil, &[evil, evil], vec![vec![evil.into(), evil.into()]])
+                .figures(vec![(svg.clone(), evil.into())]),
+        ],
+    };
+    let html = page.to_html().unwrap();
+    assert!(!html.contains("<script"));
+    // title and h1, subtitle, badge, term and value, heading, paragraph, warning, item, table's label and caption, four cells, caption
+    let count = |text: &str| text.matches("&lt;script&gt;").count();
+    assert_eq!(count(&html) - count(&svg), 17);
 }
 
 #[test]
@@ -262,6 +506,15 @@ fn page_is_self_contained() {
     for alien in ["<script", "<link", "@import", "url(", "src=", "href="] {
         assert!(!html.contains(alien), "{alien}");
     }
-    assert_eq!(html.matches("<svg ").count(), 9);
-    assert!(html.contains("<b>consistent</b>"));
+    assert_eq!(html.matches("<svg ").count(), 10);
+    // one style sheet for all figures
+    assert_eq!(html.matches("<style>").count(), 1);
+    for (verdict, word) in [
+        (Verdict::Consistent, "consistent"),
+        (Verdict::Inconsistent, "inconsistent"),
+        (Verdict::Inconclusive, "inconclusive"),
+    ] {
+        let page = Page { badge: Some(Badge::new(verdict, "why")), ..Page::default() };
+        assert!(page.to_html().unwrap().contains(&format!("<b>{word}</b><span>why</span>")), "{word}");
+    }
 }

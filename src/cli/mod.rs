@@ -55,10 +55,14 @@ enum Command {
 pub fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
-        Err(error) => {
-            // clap prints usage errors to stderr, help and version to stdout; a closed pipe is no error
-            let _ = error.print();
-            return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
+        Err(error) if error.use_stderr() => {
+            eprintln!("kfdesign: {}", usage_error(&error));
+            return ExitCode::from(2);
+        }
+        Err(help) => {
+            // help and version go to stdout; a closed pipe is no error
+            let _ = help.print();
+            return ExitCode::SUCCESS;
         }
     };
     let result = match cli.command {
@@ -78,4 +82,12 @@ pub fn main() -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+/// clap's message as one line: what was found and what is expected, without the usage block.
+fn usage_error(error: &clap::Error) -> String {
+    let text = error.render().to_string();
+    let message = text.split("\n\n").next().unwrap_or(&text);
+    let words: Vec<&str> = message.trim_start_matches("error: ").split_whitespace().collect();
+    format!("{} (kfdesign --help, or kfdesign COMMAND --help, lists what there is)", words.join(" "))
 }

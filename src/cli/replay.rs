@@ -2,7 +2,8 @@
 
 mod sight;
 
-use std::path::{Path, PathBuf};
+use std::io::Write;
+use std::path::PathBuf;
 
 use anyhow::Context;
 
@@ -10,7 +11,7 @@ use super::Status;
 use super::log_flags::{LogFlags, print_check};
 use super::output::{digits, print_json, print_text, progress, table};
 use crate::consistency::{Test, Verdict};
-use crate::export::atomic::{self, refuse_input_as_output};
+use crate::export::atomic::{AtomicFile, refuse_input_as_output};
 use crate::export::table::TableWriter;
 use crate::filter::FilterDesign;
 use crate::input::{Block, LogReader};
@@ -54,8 +55,10 @@ pub struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
+    let options = Options { alpha: args.alpha, gate: args.gate };
+    options.check()?;
     let design = FilterDesign::read(&args.filter)?;
-    for output in args.outputs() {
+    for output in [&args.output, &args.report, &args.plot].into_iter().flatten() {
         refuse_input_as_output(output, &args.log)?;
         refuse_input_as_output(output, &args.filter)?;
     }
@@ -67,19 +70,23 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         quantity: reader.quantity(),
         sample_rate_hz: reader.check().sample_rate_hz,
     };
-    let options = Options { alpha: args.alpha, gate: args.gate };
     let replayer = Replayer::new(&design, &shape, options).with_context(|| name.clone())?;
     say_assignment(&design, &replayer, &shape);
+    // opened before the work, so that a place that cannot be written is told at once
+    let create = |path: &Option<PathBuf>| path.as_deref().map(AtomicFile::create).transpose();
+    let (report, plot) = (create(&args.report)?, create(&args.plot)?);
     let mut result = stream(args, &design, replayer, &mut reader)?;
     result.log = Some(name);
     result.log_sha256 = Some(reader.sha256().to_string());
     let unit = reader.axes().first().map(|a| a.unit.clone());
-    if let Some(path) = &args.plot {
-        atomic::write(path, sight::sheet(&result, unit.as_ref()).as_bytes())?;
+    if let Some(mut file) = plot {
+        file.write_all(sight::sheet(&result, unit.as_ref()).as_bytes()).context("plot")?;
+        file.commit()?;
     }
-    if let Some(path) = &args.report {
+    if let Some(mut file) = report {
         let page = sight::page(&result, &args.filter.display().to_string(), unit.as_ref());
-        atomic::write(path, page.to_html()?.as_bytes())?;
+        file.write_all(page.to_html()?.as_bytes()).context("report")?;
+        file.commit()?;
     }
     if args.json {
         print_json(&result)?;
@@ -90,12 +97,6 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         Verdict::Inconsistent => Status::CheckFailed,
         Verdict::Consistent | Verdict::Inconclusive => Status::Done,
     })
-}
-
-impl Args {
-    fn outputs(&self) -> impl Iterator<Item = &Path> {
-        [&self.output, &self.report, &self.plot].into_iter().flatten().map(PathBuf::as_path)
-    }
 }
 
 /// One line on stderr when names had to be matched or axes are left out.

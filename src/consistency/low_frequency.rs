@@ -11,6 +11,7 @@ use super::effect::{Effect, VARIANCE_RATIO_TOLERANCE};
 use super::normalized::mean_of_chi_squares;
 use super::whiteness::{CumulativePeriodogram, cumulative_periodogram};
 use crate::numerics::distribution::chi_square_quantile;
+use crate::units::digits;
 
 /// Below this number of blocks a length is not judged.
 pub const FEWEST_BLOCKS: u64 = 8;
@@ -199,16 +200,18 @@ impl BlockResult {
         let seconds = self.length as f64 * dt;
         let meaning = if self.ratio > self.upper {
             format!(
-                "averaged over {seconds:.4} s the innovations have {:.3} times the predicted power: the filter is optimistic about slow drift (it expects less than there is)",
-                self.ratio
+                "averaged over {} s the innovations have {} times the predicted power: the filter is optimistic about slow drift (it expects less than there is)",
+                digits(seconds),
+                digits(self.ratio)
             )
         } else if self.ratio < self.lower {
             format!(
-                "averaged over {seconds:.4} s the innovations have {:.3} times the predicted power: the filter is pessimistic about slow drift (it expects more than there is)",
-                self.ratio
+                "averaged over {} s the innovations have {} times the predicted power: the filter is pessimistic about slow drift (it expects more than there is)",
+                digits(seconds),
+                digits(self.ratio)
             )
         } else {
-            format!("averaged over {seconds:.4} s the innovations have the predicted power")
+            format!("averaged over {} s the innovations have the predicted power", digits(seconds))
         };
         Test::new(axis, "low_frequency", self.ratio, [self.lower, self.upper], self.p_value, meaning)
             .with_averaging(seconds)

@@ -4,6 +4,7 @@ use super::Test;
 use super::effect::{AUTOCORRELATION_TOLERANCE, Effect, PERIODOGRAM_TOLERANCE, PREDICTABLE_TOLERANCE};
 use crate::numerics::distribution::{chi_square_quantile, chi_square_sf, kolmogorov_sf, normal_quantile, normal_sf};
 use crate::signal::spectrum::periodogram;
+use crate::units::digits;
 
 /// Sums for the autocorrelation of a sequence at lags 1..=L, in one pass with memory for L samples.
 ///
@@ -207,9 +208,9 @@ impl Whiteness {
             "no lag is correlated beyond chance".to_string()
         } else {
             format!(
-                "the innovations are correlated, most at lag {} ({:.4} s): the model misses something that fast",
+                "the innovations are correlated, most at lag {} ({} s): the model misses something that fast",
                 self.lag,
-                self.lag as f64 * dt
+                digits(self.lag as f64 * dt)
             )
         };
         let largest = Test::new(
@@ -229,9 +230,9 @@ impl Whiteness {
         let (share, interval) = self.predictable_share(alpha);
         let all = if self.ljung_box > self.ljung_box_upper {
             format!(
-                "lags 1 to {} together are correlated: a better model could predict about {:.2} % of the innovation variance",
+                "lags 1 to {} together are correlated: a better model could predict about {} % of the innovation variance",
                 self.lags,
-                100.0 * share
+                digits(100.0 * share)
             )
         } else if self.ljung_box < self.ljung_box_lower {
             format!("lags 1 to {} are less correlated than chance allows: the samples are not a raw log", self.lags)
@@ -343,16 +344,16 @@ fn kolmogorov_quantile(p: f64) -> f64 {
 impl CumulativePeriodogram {
     /// The record of the test; `interval_s` is the time between two points of the series.
     pub fn test(&self, axis: &str, interval_s: f64) -> Test {
-        let period = interval_s / self.frequency;
+        let period = digits(interval_s / self.frequency);
         let meaning = if self.distance.abs() <= self.bound {
-            format!("the innovations are white at periods above {:.3} s", 2.0 * interval_s)
+            format!("the innovations are white at periods above {} s", digits(2.0 * interval_s))
         } else if self.distance > 0.0 {
             format!(
-                "too much innovation power at periods above {period:.3} s: the filter is optimistic about slow drift (it expects less than there is)"
+                "too much innovation power at periods above {period} s: the filter is optimistic about slow drift (it expects less than there is)"
             )
         } else {
             format!(
-                "too little innovation power at periods above {period:.3} s: the filter is pessimistic about slow drift (it expects more than there is)"
+                "too little innovation power at periods above {period} s: the filter is pessimistic about slow drift (it expects more than there is)"
             )
         };
         let size = self.distance.abs();

@@ -2,26 +2,10 @@
 
 use std::path::Path;
 
+pub use super::steady_state::SteadyState;
 use crate::model::LinearModel;
 use crate::params::AxisParams;
 use crate::units::Quantity;
-
-#[derive(Clone, Debug)]
-pub struct SteadyState {
-    /// n × m gain K (states whose variance tends to zero have 0).
-    pub gain: nalgebra::DMatrix<f64>,
-    /// P(k|k−1).
-    pub predicted_covariance: nalgebra::DMatrix<f64>,
-    pub innovation_covariance: nalgebra::DMatrix<f64>,
-    /// Closed-loop poles, eigenvalues of (I − K H) F, as (re, im).
-    pub poles: Vec<(f64, f64)>,
-    /// s.
-    pub settling_time: f64,
-    /// Largest relative residual of the Riccati equation.
-    pub residual: f64,
-    /// Largest relative difference to the eigenvector solution.
-    pub eigenvector_difference: f64,
-}
 
 #[derive(Clone, Debug)]
 pub struct AxisDesign {

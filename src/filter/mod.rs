@@ -6,3 +6,4 @@ pub mod steady_state;
 
 pub use document::{AxisDesign, FilterDesign, FilterError};
 pub use kalman::Kalman;
+pub use steady_state::{SteadyState, SteadyStateError, steady_state};

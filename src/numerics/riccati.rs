@@ -2,7 +2,9 @@
 
 use nalgebra::{Complex, DMatrix};
 
-use super::linalg::{LinalgError, relative_to_diagonal, require_shape, solve, solve_spd, symmetrise, to_faer};
+use super::linalg::{
+    LinalgError, cholesky_semidefinite, relative_to_diagonal, require_shape, solve, solve_spd, symmetrise, to_faer,
+};
 
 /// Doublings before giving up: 2^64 steps of the filter.
 const MAX_DOUBLINGS: usize = 64;
@@ -30,32 +32,73 @@ pub fn dare_doubling(
     q: &DMatrix<f64>,
     r: &DMatrix<f64>,
 ) -> Result<RiccatiSolution, LinalgError> {
-    let n = f.nrows();
-    let mut g = information(f, h, q, r)?;
-    let identity = DMatrix::<f64>::identity(n, n);
-    // a: closed-loop transition over 2^k steps (transposed), x: the solution so far, g: its dual.
-    let mut a = f.transpose();
-    let mut x = q.clone();
+    let mut flow = Flow::one_step(f, h, q, r)?;
     let mut change = f64::INFINITY;
     for iteration in 0..MAX_DOUBLINGS {
-        let w = &identity + &g * &x;
-        let w_a = solve(w.clone(), &a)?;
-        let w_g = solve(w, &g)?;
-        let mut step = a.transpose() * &x * &w_a;
-        symmetrise(&mut step);
-        g += &a * w_g * a.transpose();
-        symmetrise(&mut g);
-        x += &step;
-        a = &a * w_a;
-        change = relative_to_diagonal(&step, x.diagonal().as_slice());
+        let step = flow.double()?;
+        change = relative_to_diagonal(&step, flow.x.diagonal().as_slice());
         // The closed loop must have died out as well: an unstable or undriven mode can sit at zero change.
-        if change <= f64::EPSILON && a.amax() < 1.0 {
-            let covariance = newton(f, h, q, r, &x)?;
+        if change <= f64::EPSILON && flow.a.iter().all(|v| v.abs() < 1.0) {
+            let covariance = newton(f, h, q, r, &flow.x)?;
             let relative_residual = residual(f, h, q, r, &covariance)?;
             return Ok(RiccatiSolution { covariance, relative_residual, iterations: iteration + 1 });
         }
     }
     Err(LinalgError::NoConvergence { iterations: MAX_DOUBLINGS, residual: change })
+}
+
+/// P(k|k−1) at k = 2^doublings when P(0|−1) is `p0`, from the same doubling; needs no stability.
+///
+/// P_k = X + Aᵀ P0 (I + G P0)⁻¹ A, with P0 = L Lᵀ as X + Aᵀ L (I + Lᵀ G L)⁻¹ Lᵀ A. Errors: shapes, R not definite, P0 indefinite.
+pub fn covariance_after(
+    f: &DMatrix<f64>,
+    h: &DMatrix<f64>,
+    q: &DMatrix<f64>,
+    r: &DMatrix<f64>,
+    p0: &DMatrix<f64>,
+    doublings: u32,
+) -> Result<DMatrix<f64>, LinalgError> {
+    require_shape(p0, f.nrows(), f.nrows())?;
+    let mut flow = Flow::one_step(f, h, q, r)?;
+    for _ in 0..doublings {
+        flow.double()?;
+    }
+    let l = cholesky_semidefinite(p0)?;
+    let inner = DMatrix::<f64>::identity(l.nrows(), l.nrows()) + l.transpose() * &flow.g * &l;
+    let l_a = l.transpose() * &flow.a;
+    let mut p = flow.x + l_a.transpose() * solve_spd(&inner, &l_a)?;
+    symmetrise(&mut p);
+    Ok(p)
+}
+
+/// The Riccati recursion over 2^k steps, P → X + Aᵀ P (I + G P)⁻¹ A: A is the transposed closed-loop transition from P = 0,
+/// X the covariance reached from P = 0, G the information gathered about the start.
+struct Flow {
+    a: DMatrix<f64>,
+    g: DMatrix<f64>,
+    x: DMatrix<f64>,
+}
+
+impl Flow {
+    /// Checks the shapes; one step.
+    fn one_step(f: &DMatrix<f64>, h: &DMatrix<f64>, q: &DMatrix<f64>, r: &DMatrix<f64>) -> Result<Flow, LinalgError> {
+        Ok(Flow { a: f.transpose(), g: information(f, h, q, r)?, x: q.clone() })
+    }
+
+    /// Twice as many steps; returns what was added to X.
+    fn double(&mut self) -> Result<DMatrix<f64>, LinalgError> {
+        let n = self.a.nrows();
+        let w = DMatrix::<f64>::identity(n, n) + &self.g * &self.x;
+        let w_a = solve(w.clone(), &self.a)?;
+        let w_g = solve(w, &self.g)?;
+        let mut step = self.a.transpose() * &self.x * &w_a;
+        symmetrise(&mut step);
+        self.g += &self.a * w_g * self.a.transpose();
+        symmetrise(&mut self.g);
+        self.x += &step;
+        self.a = &self.a * w_a;
+        Ok(step)
+    }
 }
 
 /// The same by the stable eigenvectors of the symplectic pencil (faer): the independent check.

@@ -43,6 +43,21 @@ impl Default for Options {
     }
 }
 
+impl Options {
+    /// `alpha` is a probability, `gate` at least one sigma.
+    pub fn check(&self) -> Result<(), ReplayError> {
+        if !(self.alpha > 0.0 && self.alpha < 1.0) {
+            return Err(ReplayError::Option { name: "alpha", value: self.alpha, expected: "between 0 and 1" });
+        }
+        match self.gate {
+            Some(gate) if !(gate >= 1.0 && gate.is_finite()) => {
+                Err(ReplayError::Option { name: "gate", value: gate, expected: "at least 1 (sigmas)" })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
 /// What must be known of a log before its first block.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LogShape {
@@ -273,12 +288,7 @@ pub struct Replayer {
 impl Replayer {
     /// Checks quantity, rate and axes (see [`axes::assign`]) and starts every filter at x0, P0.
     pub fn new(design: &FilterDesign, log: &LogShape, options: Options) -> Result<Replayer, ReplayError> {
-        if !(options.alpha > 0.0 && options.alpha < 1.0) {
-            return Err(ReplayError::Option { name: "alpha", value: options.alpha, expected: "between 0 and 1" });
-        }
-        if let Some(gate) = options.gate.filter(|g| !(*g >= 1.0 && g.is_finite())) {
-            return Err(ReplayError::Option { name: "gate", value: gate, expected: "at least 1 (sigmas)" });
-        }
+        options.check()?;
         let assigned = axes::assign(design, log)?;
         Ok(Replayer {
             options,

@@ -16,6 +16,7 @@ use crate::consistency::whiteness::Whiteness;
 use crate::consistency::{Test, Verdict};
 use crate::filter::AxisDesign;
 use crate::numerics::distribution::{chi_square_cdf, chi_square_quantile, chi_square_sf, normal_quantile, normal_sf};
+use crate::units::digits;
 
 /// With fewer accepted samples no test is made.
 const FEWEST_SAMPLES: u64 = 30;
@@ -61,11 +62,11 @@ fn too_short(axis: &AxisReplay, design: &AxisDesign) -> Option<String> {
     if accepted < axis.samples / 2 {
         return Some(format!("{}: only {accepted} of {} samples were accepted", design.name, axis.samples));
     }
-    let needed = axis.low_frequency.samples_needed() * axis.every;
+    let needed = axis.low_frequency.samples_needed().saturating_mul(axis.every);
     Some(format!(
-        "{}: {accepted} accepted samples are too few to judge the drift, {needed} are needed ({:.4} s)",
+        "{}: {accepted} accepted samples are too few to judge the drift, {needed} are needed ({} s)",
         design.name,
-        needed as f64 * design.model.dt
+        digits(needed as f64 * design.model.dt)
     ))
 }
 
@@ -187,7 +188,8 @@ fn start_test(axis: &str, score: f64, information: f64, alpha: f64) -> (Start, T
     let bound = normal_quantile(1.0 - alpha / 2.0);
     let meaning = if z.abs() > bound {
         format!(
-            "the log starts {sigmas:.2} sigma from x0: its bias is outside what P0 allows; raise the turn-on bias (the other tests feel this start too)"
+            "the log starts {} sigma from x0: its bias is outside what P0 allows; raise the turn-on bias (the other tests feel this start too)",
+            digits(sigmas)
         )
     } else {
         "the log starts where x0 and P0 say".to_string()
@@ -210,8 +212,9 @@ fn rejected_test(axis: &str, gate: f64, rejected: u64, accepted: u64, alpha: f64
     // bounds of the share by the normal approximation, for the eye; the p-value is the Poisson one
     let spread = normal_quantile(1.0 - alpha / 2.0) * expected.sqrt() / total;
     let meaning = format!(
-        "{rejected} samples ({:.3} %) are outside {gate} sigma; a true design rejects {expected:.3}",
-        100.0 * share
+        "{rejected} samples ({} %) are outside {gate} sigma; a true design rejects {}",
+        digits(100.0 * share),
+        digits(expected)
     );
     let p_value = (2.0 * more.min(fewer)).min(1.0);
     Test::new(axis, "rejected", share, [(normal - spread).max(0.0), normal + spread], p_value, meaning).with_effect(
@@ -239,7 +242,7 @@ fn meaning(verdict: Verdict, alpha: f64, tests: &[Test], axes: &[AxisResult], sh
             let longest =
                 axes.iter().filter_map(|a| a.low_frequency.last().map(|l| l.block_s)).fold(f64::INFINITY, f64::min);
             let drift = if longest.is_finite() {
-                format!(", and their slow part is as predicted up to averages of {longest:.4} s")
+                format!(", and their slow part is as predicted up to averages of {} s", digits(longest))
             } else {
                 String::new()
             };

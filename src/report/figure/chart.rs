@@ -93,7 +93,7 @@ impl Chart {
 
     /// (x, lower, upper).
     pub(super) fn band(&mut self, series: usize, edges: Vec<(f64, f64, f64)>) {
-        self.marks.push(Mark::Band { series, edges });
+        self.marks.push(Mark::Band { series, edges: thin_band(edges, &self.x.scale) });
     }
 
     pub(super) fn dots(&mut self, series: usize, points: Vec<(f64, f64)>) {
@@ -247,7 +247,7 @@ impl Chart {
                 let rectangles = bars.iter().filter_map(|&(left, right, height)| {
                     let t = y.to_unit(height);
                     (t > 0.0 && left < right)
-                        .then(|| Rectangle::new([(left, y.from_unit(t.min(1.0))), (right, y_ends.0)], fill))
+                        .then(|| Rectangle::new([(left, y.value_at(t.min(1.0))), (right, y_ends.0)], fill))
                 });
                 chart.draw_series(rectangles)?;
             }
@@ -353,7 +353,7 @@ fn clip(points: &[(f64, f64)], x: &Scale, y: &Scale) -> Vec<Vec<(f64, f64)>> {
             open = false;
             continue;
         };
-        let at = |t: f64| (x.from_unit(a.0 + t * (b.0 - a.0)), y.from_unit(a.1 + t * (b.1 - a.1)));
+        let at = |t: f64| (x.value_at(a.0 + t * (b.0 - a.0)), y.value_at(a.1 + t * (b.1 - a.1)));
         match pieces.last_mut() {
             Some(piece) if open && from == 0.0 => piece.push(at(to)),
             _ => pieces.push(vec![at(from), at(to)]),
@@ -391,7 +391,7 @@ fn band_pieces(edges: &[(f64, f64, f64)], x: &Scale, y: &Scale) -> Vec<(Edge, Ed
     let mut pieces: Vec<(Edge, Edge)> = vec![];
     let mut open = false;
     for &(at, lower, upper) in edges {
-        let cut = |v: f64| y.from_unit(y.to_unit(v).clamp(0.0, 1.0));
+        let cut = |v: f64| y.value_at(y.to_unit(v).clamp(0.0, 1.0));
         // a lower edge at or below zero on a logarithmic axis goes to the bottom of the plot
         let lower = if y.to_unit(lower).is_nan() && lower <= 0.0 { y.ends().0 } else { cut(lower) };
         let upper = cut(upper);
@@ -435,6 +435,19 @@ fn thin(points: Vec<(f64, f64)>, x: &Scale) -> Vec<(f64, f64)> {
         }
     }
     out
+}
+
+/// The envelope of each stretch of a long band.
+fn thin_band(edges: Vec<(f64, f64, f64)>, x: &Scale) -> Vec<(f64, f64, f64)> {
+    if edges.len() <= 4 * COLUMNS {
+        return edges;
+    }
+    let column = |e: &(f64, f64, f64)| (x.to_unit(e.0) * COLUMNS as f64).floor();
+    let envelope = |a: (f64, f64, f64), b: &(f64, f64, f64)| (a.0, a.1.min(b.1), a.2.max(b.2));
+    edges
+        .chunk_by(|a, b| column(a) == column(b))
+        .filter_map(|group| group.split_first().map(|(first, rest)| rest.iter().fold(*first, envelope)))
+        .collect()
 }
 
 #[cfg(test)]

@@ -112,42 +112,63 @@ pub fn cumulative_periodogram(data: &Periodogram) -> String {
     chart.render()
 }
 
-/// NEES averaged over runs, against time.
+/// NEES averaged over runs, against time; all lists have one entry per time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Nees {
     pub title: String,
     pub time_s: Vec<f64>,
     pub nees: Vec<f64>,
     /// Pointwise bounds.
-    pub lower: f64,
-    pub upper: f64,
-    /// Number of states.
+    pub lower: Vec<f64>,
+    pub upper: Vec<f64>,
+    /// The number of states, or 1 when NEES is divided by it.
     pub expected: f64,
     /// "95 % at one time".
     pub band_label: String,
 }
 
-/// Average NEES with its pointwise band.
+/// Average NEES with its pointwise band; a few times are dots, times over more than two decades stand on a logarithmic axis.
 pub fn nees(data: &Nees) -> String {
-    let clock = Clock::covering(&data.time_s);
+    let few = data.nees.len() <= 30;
+    let spread = data.time_s.last().copied().unwrap_or(0.0) / data.time_s.first().copied().unwrap_or(0.0);
+    let (clock, time) = if spread.is_finite() && spread > 100.0 {
+        let scale = Scale::log(data.time_s.iter().copied());
+        (Clock::seconds(), Axis { name: "time".into(), unit: "s".into(), scale })
+    } else {
+        let clock = Clock::covering(&data.time_s);
+        let mut axis = clock.axis();
+        if few {
+            axis.scale = Scale::linear_padded(data.time_s.iter().map(|&t| clock.show(t)), &[]);
+        }
+        (clock, axis)
+    };
+    let values = data.nees.iter().chain(&data.lower).chain(&data.upper).copied();
     let mut chart = Chart::new(
         &data.title,
         &format!(
-            "Average NEES over time; expected {:.3}, pointwise bounds {:.3} to {:.3}.",
-            data.expected, data.lower, data.upper
+            "Average NEES at {} times; expected {:.3}; {} outside their pointwise bounds.",
+            data.nees.len(),
+            data.expected,
+            data.nees.iter().zip(data.lower.iter().zip(&data.upper)).filter(|(v, (l, u))| *v < l || *v > u).count()
         ),
-        clock.axis(),
+        time,
         Axis {
             name: "average NEES".into(),
             unit: String::new(),
-            scale: Scale::linear_padded(data.nees.iter().copied(), &[data.lower, data.upper]),
+            scale: Scale::linear_padded(values, &[data.expected]),
         },
     );
-    let ends = [data.time_s.first(), data.time_s.last()];
-    chart.band(5, ends.into_iter().flatten().map(|&t| (clock.show(t), data.lower, data.upper)).collect());
+    let times = || data.time_s.iter().map(|&t| clock.show(t));
+    chart.band(5, times().zip(data.lower.iter().zip(&data.upper)).map(|(t, (&l, &u))| (t, l, u)).collect());
     chart.level(Class::Expected, data.expected);
-    chart.line(Class::Line(0), data.time_s.iter().zip(&data.nees).map(|(&t, &v)| (clock.show(t), v)).collect());
-    chart.legend_line(Class::Line(0), "average over runs");
+    let points: Vec<(f64, f64)> = times().zip(data.nees.iter().copied()).collect();
+    if few {
+        chart.dots(0, points);
+        chart.legend_dots(0, "average over runs");
+    } else {
+        chart.line(Class::Line(0), points);
+        chart.legend_line(Class::Line(0), "average over runs");
+    }
     chart.legend_line(Class::Expected, "expected");
     chart.legend_band(5, &data.band_label);
     chart.render()

@@ -68,7 +68,9 @@ impl Scale {
         let (low, high) = extent(values, |v| v.is_finite() && v > 0.0);
         let (low, high) = if low > high { (0.1, 10.0) } else { (low.log10(), high.log10()) };
         let margin = (0.03 * (high - low)).max(if high - low < 0.3 { 0.3 } else { 0.05 });
-        let (low, high) = (low - margin, high + margin);
+        // doubles end at 1e308
+        let low = (low - margin).clamp(-306.0, 305.0);
+        let high = (high + margin).clamp(low + 0.6, 306.0);
         let decades: Vec<i32> = (low.ceil() as i32..=high.floor() as i32).collect();
         let every = decades.len().div_ceil(8).max(1) as i32;
         let inside = |v: &f64| (low..=high).contains(&v.log10());
@@ -101,7 +103,7 @@ impl Scale {
         }
     }
 
-    pub(super) fn from_unit(&self, t: f64) -> f64 {
+    pub(super) fn value_at(&self, t: f64) -> f64 {
         if self.logarithmic {
             10f64.powf(self.low.log10() + t * (self.high.log10() - self.low.log10()))
         } else {
@@ -254,6 +256,8 @@ mod tests {
             Scale::log([-1.0, 0.0, f64::NAN]),
             Scale::log([1e-300, 1e300]),
             Scale::log([7.0]),
+            Scale::log([5e-324]),
+            Scale::log([f64::MAX]),
         ] {
             let (low, high) = scale.ends();
             assert!(low < high, "{scale:?}");

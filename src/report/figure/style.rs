@@ -76,7 +76,22 @@ impl Class {
     }
 }
 
-fn rules(ink: &str, muted: &str, faint: &str, paper: &str, bound: &str, series: &[&str; SERIES]) -> String {
+/// Colours of everything but the series.
+struct Theme {
+    ink: &'static str,
+    muted: &'static str,
+    faint: &'static str,
+    paper: &'static str,
+    bound: &'static str,
+}
+
+const LIGHT_THEME: Theme =
+    Theme { ink: "#1b1f24", muted: "#57606a", faint: "#dfe3e8", paper: "#ffffff", bound: "#a83a2c" };
+const DARK_THEME: Theme =
+    Theme { ink: "#e4e8ec", muted: "#a3acb5", faint: "#343b43", paper: "#14181d", bound: "#f08a7c" };
+
+fn rules(theme: &Theme, series: &[&str; SERIES]) -> String {
+    let Theme { ink, muted, faint, paper, bound } = theme;
     let fill = |class: Class, colour: &str| format!(".kf{}{{fill:{colour}}}", class.code());
     let stroke = |class: Class, colour: &str| format!(".kf{}{{stroke:{colour}}}", class.code());
     let mut css = format!(".kf-paper{{fill:{paper}}}");
@@ -127,13 +142,13 @@ pub fn style_sheet() -> String {
         css += &format!("{}{{fill:none;stroke-width:8;stroke-linejoin:round}}", class(Class::Thread(k)));
         css += &format!("{}{{fill-opacity:.17}}", class(Class::Band(k)));
     }
-    css += &rules("#1b1f24", "#57606a", "#dfe3e8", "#ffffff", "#a83a2c", &LIGHT);
+    css += &rules(&LIGHT_THEME, &LIGHT);
     css += "@media (prefers-color-scheme:dark){";
-    css += &rules("#e4e8ec", "#a3acb5", "#343b43", "#14181d", "#f08a7c", &DARK);
+    css += &rules(&DARK_THEME, &DARK);
     css += "}";
     // a page printed from a dark screen is black on white
     css += "@media print{";
-    css += &rules("#1b1f24", "#57606a", "#dfe3e8", "#ffffff", "#a83a2c", &LIGHT);
+    css += &rules(&LIGHT_THEME, &LIGHT);
     css + "}"
 }
 
@@ -214,4 +229,65 @@ pub(super) fn text_width(text: &str, size: i32) -> i32 {
         })
         .sum();
     (ems * f64::from(size)).round() as i32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Contrast ratio of WCAG 2.2.
+    fn contrast(a: &str, b: &str) -> f64 {
+        let luminance = |colour: &str| {
+            let channel = |i: usize| {
+                let c = f64::from(u8::from_str_radix(&colour[i..i + 2], 16).unwrap()) / 255.0;
+                if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+            };
+            0.2126 * channel(1) + 0.7152 * channel(3) + 0.0722 * channel(5)
+        };
+        let (a, b) = (luminance(a), luminance(b));
+        (a.max(b) + 0.05) / (a.min(b) + 0.05)
+    }
+
+    #[test]
+    fn colours_can_be_read_on_both_papers() {
+        assert!((contrast("#ffffff", "#000000") - 21.0).abs() < 1e-9);
+        for (theme, series) in [(&LIGHT_THEME, &LIGHT), (&DARK_THEME, &DARK)] {
+            assert!(contrast(theme.ink, theme.paper) > 7.0 && contrast(theme.muted, theme.paper) > 4.5);
+            for colour in series.iter().chain([&theme.bound]) {
+                assert!(contrast(colour, theme.paper) > 4.5, "{colour}");
+            }
+        }
+    }
+
+    #[test]
+    fn series_differ_without_colour() {
+        for (i, a) in DASHES.iter().enumerate() {
+            assert!(DASHES.iter().skip(i + 1).all(|b| a != b));
+        }
+    }
+
+    #[test]
+    fn classes_have_codes_of_their_own() {
+        let series = |make: fn(usize) -> Class| (0..SERIES).map(make);
+        let all = PLAIN
+            .into_iter()
+            .chain(series(Class::Line))
+            .chain(series(Class::Thread))
+            .chain(series(Class::Marker))
+            .chain(series(Class::Band))
+            .chain(series(Class::Thin));
+        let mut codes: Vec<u8> = all.map(Class::code).collect();
+        let count = codes.len();
+        codes.sort_unstable();
+        codes.dedup();
+        assert_eq!(codes.len(), count);
+    }
+
+    #[test]
+    fn elements_keep_geometry_and_lose_presentation() {
+        let line = "polyline fill=\"none\" opacity=\"1\" stroke=\"#000014\" stroke-width=\"1\" points=\"1,2 3,4 \"/>";
+        assert_eq!(restyle(line), "<polyline class=\"kf20\" points=\"1,2 3,4\"/>");
+        let text = "text x=\"5\" y=\"6\" dy=\"0.5ex\" text-anchor=\"end\" font-family=\"sans-serif\" font-size=\"98\" opacity=\"1\" fill=\"#000002\">";
+        assert_eq!(restyle(text), "<text class=\"kf2\" x=\"5\" y=\"6\" dy=\"0.36em\" text-anchor=\"end\">");
+    }
 }

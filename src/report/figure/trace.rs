@@ -177,6 +177,10 @@ impl Clock {
         Clock { divisor, unit, low, high }
     }
 
+    pub(super) fn seconds() -> Clock {
+        Clock { divisor: 1.0, unit: "s", low: 0.0, high: 0.0 }
+    }
+
     pub(super) fn show(&self, time_s: f64) -> f64 {
         time_s / self.divisor
     }

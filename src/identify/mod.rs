@@ -1,20 +1,41 @@
-//! Logs to noise parameters (floor 4): the paper's graphical recipe, the weighted Allan fit; likelihood methods have their place here.
+//! Logs to noise parameters (floor 4): the paper's graphical recipe and the weighted Allan fit.
+//!
+//! One file per method; what they share is here. Likelihood methods, which also give the Cramér-Rao bound, get their own
+//! file and a variant of [`Method`].
 
 pub mod allan_fit;
 pub mod graphical;
+mod selection;
+mod shape;
+mod weighted_fit;
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::allan::AllanCurve;
-use crate::noise::{Kind, NoiseModel};
-use crate::params::{AxisParams, NotIdentified};
+use crate::noise::{Kind, NoiseModel, Term};
+use crate::numerics::reduce::mean;
+use crate::params::{AxisParams, Measured, NotIdentified, TermEntry};
+use crate::units::{Unit, digits};
 
+/// How parameters are taken from a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
+    /// The seed paper's reading of the Allan plot, faithfully, with what each step costs: [`graphical`].
     Graphical,
+    /// Generalised least squares on the whole overlapping Allan curve, terms chosen by score: [`allan_fit`].
     Allan,
+}
+
+impl Method {
+    /// As in params.json.
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::Graphical => "graphical",
+            Method::Allan => "allan",
+        }
+    }
 }
 
 /// Which terms may be in the model.
@@ -33,7 +54,10 @@ pub struct Candidate {
     /// Weighted sum of squares of the fit.
     pub chi_square: f64,
     pub dof: f64,
+    /// χ² plus 4 for every parameter and every process.
     pub score: f64,
+    /// Every parameter has a 95 % interval that says something.
+    pub identified: bool,
     pub chosen: bool,
 }
 
@@ -45,6 +69,7 @@ pub struct Identified {
     pub model: NoiseModel,
     /// The measured overlapping Allan curve with exact intervals for the model.
     pub curve: AllanCurve,
+    /// Best score first; empty for the graphical recipe.
     pub candidates: Vec<Candidate>,
     pub not_identified: Vec<NotIdentified>,
     /// Sentences for a person.
@@ -53,6 +78,8 @@ pub struct Identified {
     pub steps: Vec<graphical::Step>,
     /// p-value of the chosen model's fit (NaN for graphical).
     pub fit_p_value: f64,
+    /// Shortest averaging time that was used, s.
+    pub first_tau_s: f64,
 }
 
 #[derive(Clone, Debug, thiserror::Error)]
@@ -61,21 +88,125 @@ pub struct IdentifyError {
     pub message: String,
 }
 
-/// Identify one axis. `rate` SI, contiguous, finite; `display` the unit results are written in.
+/// Fewest samples from which anything is identified: three averages of ten samples.
+const FEWEST_SAMPLES: usize = 30;
+
+/// Identify one axis. `rate` SI, contiguous, finite; `dt` in s; `display` the unit of the log, in whose family results are written.
+///
+/// Fails on fewer than 30 samples, on samples that are not finite and on a constant axis.
 pub fn identify_axis(
     name: &str,
     rate: &[f64],
     dt: f64,
-    display: &crate::units::Unit,
+    display: &Unit,
     method: Method,
     choice: &ModelChoice,
 ) -> Result<Identified, IdentifyError> {
-    let _ = (name, rate, dt, display, method, choice);
-    todo!()
+    match method {
+        Method::Graphical => graphical::identify(name, rate, dt, display),
+        Method::Allan => allan_fit::identify(name, rate, dt, display, choice),
+    }
 }
 
-/// Parses `auto` or `white+gm+…`.
+/// Parses `auto` or `white+gm+…`; white noise is part of every model.
 pub fn parse_model(text: &str) -> Result<ModelChoice, IdentifyError> {
-    let _ = text;
-    todo!()
+    if text.trim() == "auto" {
+        return Ok(ModelChoice::Auto);
+    }
+    let failed = |message: String| IdentifyError { message: format!("--model {text}: {message}") };
+    let known = || shape::KINDS.map(shape::short_name).join(", ");
+    let mut kinds = Vec::new();
+    for part in text.split('+').map(str::trim) {
+        let kind = shape::KINDS
+            .into_iter()
+            .find(|k| part == shape::short_name(*k) || part == shape::document_name(*k))
+            .ok_or_else(|| failed(format!("unknown term '{part}'; known are {} (joined by +), or auto", known())))?;
+        if kind != Kind::GaussMarkov && kinds.contains(&kind) {
+            return Err(failed(format!("'{part}' stands twice; only gm may")));
+        }
+        kinds.push(kind);
+    }
+    if kinds.iter().filter(|k| **k == Kind::GaussMarkov).count() > 3 {
+        return Err(failed("more than three gm cannot be told apart in an Allan curve".into()));
+    }
+    if !kinds.contains(&Kind::White) {
+        return Err(failed("white must be part of the model: every sampled sensor has it".into()));
+    }
+    kinds.sort_unstable();
+    Ok(ModelChoice::Terms(kinds))
+}
+
+/// The samples can be worked with.
+fn usable(name: &str, rate: &[f64]) -> Result<(), IdentifyError> {
+    let failed = |message: String| Err(IdentifyError { message: format!("{name}: {message}") });
+    if rate.len() < FEWEST_SAMPLES {
+        return failed(format!(
+            "{} samples are too few to identify noise: at least {FEWEST_SAMPLES} are needed",
+            rate.len()
+        ));
+    }
+    if let Some(index) = rate.iter().position(|x| !x.is_finite()) {
+        return failed(format!("sample {index} is not finite: cut the log with --start/--end"));
+    }
+    if rate.iter().all(|x| *x == rate[0]) {
+        return failed(format!(
+            "constant ({} in SI units, {} samples): a sensor that says the same all the time has no noise to identify; check the column",
+            digits(rate[0]),
+            rate.len()
+        ));
+    }
+    Ok(())
+}
+
+/// The unit of a term's coefficient in the family of the log's unit.
+fn coefficient_unit(kind: Kind, display: &Unit) -> Unit {
+    display.times_time(match kind {
+        Kind::Quantization => 2,
+        Kind::White => 1,
+        Kind::BiasInstability | Kind::GaussMarkov => 0,
+        Kind::RateRandomWalk => -1,
+        Kind::RateRamp => -2,
+    })
+}
+
+/// A term as documented, with the 95 % intervals (SI) of its one or two parameters.
+fn entry(term: &Term, intervals: &[Option<[f64; 2]>; 2], display: &Unit) -> Result<TermEntry, IdentifyError> {
+    let seconds = Unit::parse("s").map_err(|e| IdentifyError { message: e.to_string() })?;
+    let unit = coefficient_unit(term.kind(), display);
+    let coefficient = |value: f64| Measured::from_si(value, intervals[0], unit.clone());
+    Ok(match *term {
+        Term::Quantization { coefficient: q } => TermEntry::Quantization { coefficient: coefficient(q) },
+        Term::White { density } => TermEntry::White { density: coefficient(density) },
+        Term::BiasInstability { coefficient: b } => TermEntry::BiasInstability { coefficient: coefficient(b) },
+        Term::GaussMarkov { std_dev, correlation_time } => TermEntry::GaussMarkov {
+            std_dev: coefficient(std_dev),
+            correlation_time: Measured { value: correlation_time, unit: seconds, interval: intervals[1] },
+        },
+        Term::RateRandomWalk { density } => TermEntry::RateRandomWalk { density: coefficient(density) },
+        Term::RateRamp { slope } => TermEntry::RateRamp { slope: coefficient(slope) },
+    })
+}
+
+/// The mean of the log with its 95 % interval for the constant bias.
+///
+/// Variance of the record mean over T: N²/T + 2σ²Tc/T·(1 − (Tc/T)(1 − e^(−T/Tc))) for the stationary terms. A
+/// random walk, flicker or ramp has no mean; for these the interval is where the mean of an equally long next log will lie
+/// (twice their Allan variance at T).
+fn bias(rate: &[f64], dt: f64, model: &NoiseModel, display: &Unit) -> Measured {
+    let samples = rate.len() as u64;
+    let span = rate.len() as f64 * dt;
+    let variance = |term: &Term| match *term {
+        Term::White { density } => density * density / span,
+        Term::GaussMarkov { std_dev, correlation_time } => {
+            let x = correlation_time / span;
+            2.0 * std_dev * std_dev * x * (1.0 + x * (-1.0 / x).exp_m1())
+        }
+        // the error of the integral over its length
+        Term::Quantization { coefficient } => 2.0 * (coefficient / span).powi(2),
+        other => 2.0 * other.allan_variance(samples, dt),
+    };
+    let sigma = model.terms.iter().map(variance).sum::<f64>().sqrt();
+    let value = mean(rate);
+    let interval = (!model.terms.is_empty()).then_some([value - 1.96 * sigma, value + 1.96 * sigma]);
+    Measured::from_si(value, interval, display.times_time(0))
 }

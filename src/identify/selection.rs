@@ -1,0 +1,135 @@
+//! Which terms the log asks for, and which averaging times it can be asked at.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use super::shape::{KINDS, Shape};
+use super::weighted_fit::{Fit, Points, fit};
+use crate::noise::Kind;
+
+/// The score of a model is its χ² plus this for every parameter and again for every process; the lowest score wins.
+///
+/// A random walk or flicker term on a white log must gain 8 (probability 0.0023 by chance), a Gauss-Markov term 12; but to
+/// prefer Gauss-Markov to the random walk, its limit, it must gain 4 (0.023). Measured rates: docs/validation.md.
+pub(super) const PENALTY: f64 = 4.0;
+/// A fit with a smaller p-value does not explain the curve.
+pub(super) const FIT_LEVEL: f64 = 0.01;
+/// Most Gauss-Markov processes that are looked for.
+const MOST_GAUSS_MARKOV: usize = 2;
+/// Short averaging times may be left out up to this many samples …
+const LEFT_OUT_FACTOR: u64 = 100;
+/// … as long as this many points remain.
+const REMAINING_POINTS: usize = 10;
+
+/// All models that were fitted to the same points.
+#[derive(Clone, Debug)]
+pub(super) struct Table {
+    pub(super) points: Points,
+    fits: BTreeMap<Shape, Option<Fit>>,
+}
+
+pub(super) fn score(fit: &Fit) -> f64 {
+    fit.chi_square + PENALTY * (fit.shape.parameters() + fit.shape.kinds().len()) as f64
+}
+
+impl Table {
+    fn new(points: Points) -> Table {
+        Table { points, fits: BTreeMap::new() }
+    }
+    /// Fit what was not fitted yet.
+    fn add(&mut self, shapes: impl IntoIterator<Item = Shape>) {
+        let mut new: Vec<Shape> = shapes.into_iter().filter(|s| !self.fits.contains_key(s)).collect();
+        new.sort();
+        new.dedup();
+        let points = &self.points;
+        let fits: Vec<Option<Fit>> = new.par_iter().map(|shape| fit(points, shape)).collect();
+        self.fits.extend(new.into_iter().zip(fits));
+    }
+    pub(super) fn get(&self, shape: &Shape) -> Option<&Fit> {
+        self.fits.get(shape).and_then(Option::as_ref)
+    }
+    /// Best score first; equal scores by the fixed order of shapes.
+    pub(super) fn ranked(&self) -> Vec<&Fit> {
+        let mut fits: Vec<&Fit> = self.fits.values().flatten().collect();
+        fits.sort_by(|a, b| score(a).total_cmp(&score(b)));
+        fits
+    }
+    pub(super) fn best(&self) -> Option<&Fit> {
+        self.ranked().first().copied()
+    }
+    fn explains(&self) -> bool {
+        self.best().is_some_and(|fit| fit.p_value() >= FIT_LEVEL)
+    }
+    fn misfit(&self) -> f64 {
+        self.best().map_or(f64::INFINITY, Fit::inflation)
+    }
+}
+
+/// Grow from white noise: add, replace or drop one process at a time while the score falls.
+fn grow(points: &Points) -> Table {
+    let mut table = Table::new(points.clone());
+    let mut current = Shape::new(vec![Kind::White]);
+    table.add([current.clone()]);
+    loop {
+        table.add(neighbours(&current));
+        match table.best() {
+            Some(best) if best.shape != current => current = best.shape.clone(),
+            _ => return table,
+        }
+    }
+}
+
+/// Models that differ by one process, white noise always kept.
+fn neighbours(shape: &Shape) -> Vec<Shape> {
+    let may_add = |shape: &Shape, kind: Kind| match kind {
+        Kind::GaussMarkov => shape.count(kind) < MOST_GAUSS_MARKOV,
+        kind => !shape.has(kind),
+    };
+    let mut found: Vec<Shape> = KINDS.iter().filter(|k| may_add(shape, **k)).map(|k| shape.with(*k)).collect();
+    for kind in shape.kinds().iter().filter(|k| **k != Kind::White) {
+        let fewer = shape.without(*kind);
+        found.extend(KINDS.iter().filter(|k| **k != *kind && may_add(&fewer, **k)).map(|k| fewer.with(*k)));
+        found.push(fewer);
+    }
+    found
+}
+
+/// Fit the forced model, or grow one, to the points; if that does not explain the curve, try without the shortest averaging times.
+///
+/// The rule: only averaging factors up to 100 samples may be left out (anti-alias filters and vibration act there), at least
+/// ten points must remain. A model is found on the points beyond; the shorter ones are then taken in, longest first, as long
+/// as the fit keeps a p-value of 0.01. If no model explains even the long averaging times, nothing is left out, unless the
+/// misfit √(χ²/dof) more than halves by it.
+pub(super) fn search(points: &Points, forced: Option<&Shape>) -> Table {
+    let find = |points: &Points| match forced {
+        None => grow(points),
+        Some(shape) => {
+            let mut table = Table::new(points.clone());
+            table.add([shape.clone()]);
+            table
+        }
+    };
+    let full = find(points);
+    if full.explains() {
+        return full;
+    }
+    let firsts: Vec<u64> = points
+        .factors
+        .iter()
+        .enumerate()
+        .skip(1)
+        .filter(|(i, m)| **m <= LEFT_OUT_FACTOR && points.len() - i >= REMAINING_POINTS)
+        .map(|(_, m)| *m)
+        .collect();
+    let Some(last) = firsts.last() else { return full };
+    let safe = find(&points.starting_at(*last));
+    let Some(best) = safe.best().filter(|_| safe.explains()) else {
+        return if 2.0 * safe.misfit() < full.misfit() { safe } else { full };
+    };
+    let kept = |first: &&u64| fit(&points.starting_at(**first), &best.shape).is_some_and(|f| f.p_value() >= FIT_LEVEL);
+    let Some(first) = firsts.iter().rev().skip(1).take_while(kept).last() else { return safe };
+    let mut table = find(&points.starting_at(*first));
+    table.add([best.shape.clone()]);
+    if table.explains() { table } else { safe }
+}

@@ -1,0 +1,392 @@
+//! Generalised least squares on the overlapping Allan curve.
+//!
+//! The points are correlated and, at long averaging times, far from normal. Both are taken into account: with
+//! v_i the measured and a_i(θ) the sampled-form Allan variance and e_i the exact degrees of freedom, the cube root
+//! (v_i/a_i)^(1/3) is nearly normal (Wilson and Hilferty 1931) with the moments of (χ²_e/e)^(1/3), and the points are
+//! correlated as the exact covariance of the estimates says. The fit minimises the whitened residuals of the cube roots,
+//! recomputes the weights at the minimum and repeats until nothing moves. On logs drawn from white noise + Gauss-Markov it
+//! is nearly unbiased, where residuals of the variance itself or of its logarithm are not (docs/validation.md).
+
+use nalgebra::{DMatrix, DVector};
+use slsqp::{Func, StopTols, minimize};
+use statrs::function::gamma::ln_gamma;
+
+use super::shape::{Role, Shape, one_coefficient};
+use crate::allan::{AllanCurve, edf};
+use crate::noise::{Kind, NoiseModel, Term};
+use crate::numerics::distribution::chi_square_sf;
+use crate::numerics::linalg::cholesky;
+
+/// The measured curve: Allan variances at ascending averaging factors.
+#[derive(Clone, Debug)]
+pub(super) struct Points {
+    pub(super) factors: Vec<u64>,
+    pub(super) variances: Vec<f64>,
+    /// Length of the log behind them.
+    pub(super) samples: usize,
+    /// s.
+    pub(super) dt: f64,
+}
+
+/// The outcome for one model.
+#[derive(Clone, Debug)]
+pub(super) struct Fit {
+    pub(super) shape: Shape,
+    pub(super) log_parameters: Vec<f64>,
+    /// Standard deviations of the log parameters; infinite where a parameter stands at the edge of what was searched.
+    pub(super) log_sigmas: Vec<f64>,
+    /// Whitened sum of squares.
+    pub(super) chi_square: f64,
+    pub(super) points: usize,
+}
+
+/// Correlation times shorter than this many samples are a matter of the sensor's bandwidth, not of drift.
+const SHORTEST_CORRELATION: f64 = 10.0;
+/// Correlation times are searched up to this many lengths of the log; further out a Gauss-Markov process is a random walk.
+const LONGEST_CORRELATION: f64 = 3.0;
+/// Starting values of a correlation time, equally spaced in its logarithm.
+const STARTS: usize = 6;
+/// Starts that are carried on from the diagonal to the full weights.
+const CARRIED: usize = 3;
+const REWEIGHTINGS: usize = 8;
+
+impl Points {
+    /// Points at averaging times up to a third of the log (three averages and more).
+    pub(super) fn of_curve(curve: &AllanCurve) -> Points {
+        let used = curve.points.iter().filter(|p| p.m as usize <= curve.samples / 3 && p.deviation > 0.0);
+        let (factors, variances) = used.map(|p| (p.m, p.deviation * p.deviation)).unzip();
+        Points { factors, variances, samples: curve.samples, dt: curve.dt }
+    }
+    pub(super) fn len(&self) -> usize {
+        self.factors.len()
+    }
+    /// The points at and above an averaging factor.
+    pub(super) fn starting_at(&self, first: u64) -> Points {
+        let skip = self.factors.iter().take_while(|m| **m < first).count();
+        Points {
+            factors: self.factors[skip..].to_vec(),
+            variances: self.variances[skip..].to_vec(),
+            samples: self.samples,
+            dt: self.dt,
+        }
+    }
+    pub(super) fn span_s(&self) -> f64 {
+        self.samples as f64 * self.dt
+    }
+    pub(super) fn first_tau_s(&self) -> f64 {
+        self.factors.first().map_or(f64::NAN, |m| *m as f64 * self.dt)
+    }
+
+    fn allan_variances(&self, term: &Term) -> DVector<f64> {
+        DVector::from_iterator(self.len(), self.factors.iter().map(|m| term.allan_variance(*m, self.dt)))
+    }
+    /// Range of correlation times that is searched, s.
+    fn correlation_times(&self) -> (f64, f64) {
+        let shortest = (SHORTEST_CORRELATION * self.dt).max(2.0 * self.first_tau_s());
+        (shortest, (LONGEST_CORRELATION * self.span_s()).max(4.0 * shortest))
+    }
+}
+
+impl Fit {
+    pub(super) fn model(&self) -> NoiseModel {
+        self.shape.model(&self.log_parameters)
+    }
+    pub(super) fn dof(&self) -> f64 {
+        self.points.saturating_sub(self.shape.parameters()) as f64
+    }
+    /// Probability of a worse fit if the model is right.
+    pub(super) fn p_value(&self) -> f64 {
+        if self.dof() > 0.0 { chi_square_sf(self.chi_square, self.dof()) } else { f64::NAN }
+    }
+    /// √(χ²/dof) where the fit is bad, else 1: by this the sigmas are widened.
+    pub(super) fn inflation(&self) -> f64 {
+        if self.dof() > 0.0 { (self.chi_square / self.dof()).sqrt().max(1.0) } else { 1.0 }
+    }
+}
+
+/// What turns Allan variances into whitened residuals; belongs to one model.
+struct Weights {
+    reference: DVector<f64>,
+    /// Mean of (χ²_e/e)^(1/3) per point.
+    mean: DVector<f64>,
+    /// Lower factor of the covariance of the cube roots.
+    factor: DMatrix<f64>,
+    observed: DVector<f64>,
+}
+
+impl Weights {
+    /// Independent points, degrees of freedom n/m − 1: good enough to start from.
+    fn rough(points: &Points) -> Weights {
+        let edf = points.factors.iter().map(|m| (points.samples as f64 / *m as f64 - 1.0).max(1.0));
+        let (mean, sigma): (Vec<f64>, Vec<f64>) = edf.map(cube_root_moments).unzip();
+        Weights {
+            reference: DVector::from_column_slice(&points.variances),
+            mean: DVector::from_vec(mean),
+            factor: DMatrix::from_diagonal(&DVector::from_vec(sigma)),
+            observed: DVector::repeat(points.len(), 1.0),
+        }
+    }
+
+    /// Exact covariance of the points for this model; None where it is not positive definite.
+    fn exact(points: &Points, model: &NoiseModel) -> Option<Weights> {
+        let reference = points.factors.iter().map(|m| model.allan_variance(*m, points.dt)).collect::<Vec<f64>>();
+        let covariance = edf::covariance(&points.factors, points.samples, points.dt, model);
+        let moments = |i: usize| cube_root_moments(2.0 * reference[i] * reference[i] / covariance[(i, i)]);
+        let (mean, sigma): (Vec<f64>, Vec<f64>) = (0..points.len()).map(moments).unzip();
+        let scaled = DMatrix::from_fn(points.len(), points.len(), |i, j| {
+            let correlation = covariance[(i, j)] / (covariance[(i, i)] * covariance[(j, j)]).sqrt();
+            correlation * sigma[i] * sigma[j]
+        });
+        let observed = points.variances.iter().zip(&reference).map(|(v, a)| (v / a).cbrt());
+        Some(Weights {
+            observed: DVector::from_iterator(points.len(), observed),
+            mean: DVector::from_vec(mean),
+            factor: cholesky(&scaled).ok()?,
+            reference: DVector::from_vec(reference),
+        })
+    }
+
+    fn whiten(&self, x: &mut DMatrix<f64>) {
+        // the factor has a positive diagonal: it comes out of a Cholesky decomposition
+        self.factor.solve_lower_triangular_mut(x);
+    }
+
+    /// Whitened residuals (first column) and their derivatives by the log parameters.
+    fn residuals(&self, points: &Points, shape: &Shape, log_parameters: &[f64]) -> DMatrix<f64> {
+        let derivatives = derivatives(points, shape, log_parameters);
+        let total = derivatives.column(0).into_owned();
+        let mut out = DMatrix::zeros(points.len(), derivatives.ncols());
+        for i in 0..points.len() {
+            let root = self.mean[i] * (total[i] / self.reference[i]).cbrt();
+            out[(i, 0)] = self.observed[i] - root;
+            for j in 1..derivatives.ncols() {
+                out[(i, j)] = -root / 3.0 * derivatives[(i, j)] / total[i];
+            }
+        }
+        self.whiten(&mut out);
+        out
+    }
+}
+
+/// Mean and standard deviation of (χ²_e/e)^(1/3).
+fn cube_root_moments(edf: f64) -> (f64, f64) {
+    let variance = 2.0 / (9.0 * edf);
+    if edf > 200.0 || edf.is_nan() {
+        return (1.0 - variance, variance.sqrt());
+    }
+    let half = 0.5 * edf;
+    let moment = |power: f64| (ln_gamma(half + power) - ln_gamma(half) - power * half.ln()).exp();
+    let mean = moment(1.0 / 3.0);
+    (mean, (moment(2.0 / 3.0) - mean * mean).max(0.0).sqrt())
+}
+
+/// Allan variances of the model (first column) and their derivatives by the log parameters.
+fn derivatives(points: &Points, shape: &Shape, log_parameters: &[f64]) -> DMatrix<f64> {
+    const STEP: f64 = 1e-4;
+    let mut out = DMatrix::zeros(points.len(), 1 + shape.parameters());
+    let mut column = 1;
+    for term in shape.model(log_parameters).terms {
+        let variances = points.allan_variances(&term);
+        let mut total = out.column_mut(0);
+        total += &variances;
+        out.set_column(column, &(2.0 * variances));
+        column += 1;
+        if let Term::GaussMarkov { std_dev, correlation_time } = term {
+            let at = |shift: f64| {
+                let moved = correlation_time * shift.exp();
+                points.allan_variances(&Term::GaussMarkov { std_dev, correlation_time: moved })
+            };
+            out.set_column(column, &((at(STEP) - at(-STEP)) / (2.0 * STEP)));
+            column += 1;
+        }
+    }
+    out
+}
+
+/// Lower and upper bounds of the log parameters: a coefficient may be anything from nothing to several times the curve.
+fn bounds(points: &Points, shape: &Shape) -> Vec<(f64, f64)> {
+    let (shortest, longest) = points.correlation_times();
+    let of = |(kind, role): (Kind, Role)| match (kind, role) {
+        (_, Role::CorrelationTime) => (shortest.ln(), longest.ln()),
+        (Kind::GaussMarkov, Role::Coefficient) => {
+            let ends = [shortest, longest].map(|correlation_time| touch(points, kind, correlation_time));
+            (ends[0].min(ends[1]) - 7.0, ends[0].max(ends[1]) + 2.0)
+        }
+        _ => {
+            let touch = touch(points, kind, 1.0);
+            (touch - 7.0, touch + 2.0)
+        }
+    };
+    shape.roles().into_iter().map(of).collect()
+}
+
+/// ln of the largest coefficient with which the term stays below the curve everywhere.
+fn touch(points: &Points, kind: Kind, correlation_time: f64) -> f64 {
+    let term = match kind {
+        Kind::GaussMarkov => Term::GaussMarkov { std_dev: 1.0, correlation_time },
+        kind => one_coefficient(kind, 1.0),
+    };
+    let unit = points.allan_variances(&term);
+    let ratio = points.variances.iter().zip(unit.iter()).map(|(v, u)| v / u).fold(f64::INFINITY, f64::min);
+    0.5 * ratio.ln()
+}
+
+/// Starting points: every combination of correlation times on a grid; each term at half of what touches the curve.
+fn starts(points: &Points, shape: &Shape) -> Vec<Vec<f64>> {
+    let (shortest, longest) = points.correlation_times();
+    let step = (longest / shortest).powf(1.0 / STARTS as f64);
+    let grid: Vec<f64> = (0..STARTS).map(|i| shortest * step.powf(i as f64 + 0.5)).collect();
+    let mut combinations: Vec<Vec<f64>> = vec![vec![]];
+    for _ in 0..shape.count(Kind::GaussMarkov) {
+        let longer = |chosen: &Vec<f64>| {
+            let next = grid.iter().filter(|t| chosen.last().is_none_or(|last| *t > last));
+            next.map(|t| chosen.iter().chain([t]).copied().collect()).collect::<Vec<Vec<f64>>>()
+        };
+        combinations = combinations.iter().flat_map(longer).collect();
+    }
+    let start = |times: &Vec<f64>| {
+        let mut times = times.iter();
+        let mut parameters = Vec::new();
+        for kind in shape.kinds() {
+            let time = if *kind == Kind::GaussMarkov { times.next().copied() } else { None };
+            parameters.push(touch(points, *kind, time.unwrap_or(1.0)) - 0.35);
+            parameters.extend(time.map(f64::ln));
+        }
+        parameters
+    };
+    combinations.iter().map(start).collect()
+}
+
+/// Minimise half the whitened sum of squares from a start, within bounds; returns parameters and the minimum.
+fn descend(
+    points: &Points,
+    shape: &Shape,
+    weights: &Weights,
+    bounds: &[(f64, f64)],
+    start: &[f64],
+) -> Option<(Vec<f64>, f64)> {
+    let mut at: Vec<f64> = start.iter().zip(bounds).map(|(p, (lo, hi))| p.clamp(*lo, *hi)).collect();
+    let mut best = f64::INFINITY;
+    // the quasi-Newton steps are restarted with fresh scales until they gain nothing
+    for _ in 0..6 {
+        let here = weights.residuals(points, shape, &at);
+        let scale: Vec<f64> =
+            (1..here.ncols()).map(|j| 1.0 / here.column(j).norm().clamp(1e-3, 1e6)).map(|s| s.min(1.0)).collect();
+        let unscale = |x: &[f64]| x.iter().zip(&scale).map(|(x, s)| x * s).collect::<Vec<f64>>();
+        let objective = |x: &[f64], gradient: Option<&mut [f64]>, _: &mut ()| {
+            let residuals = weights.residuals(points, shape, &unscale(x));
+            let first = residuals.column(0);
+            if let Some(gradient) = gradient {
+                for (j, g) in gradient.iter_mut().enumerate() {
+                    *g = scale[j] * first.dot(&residuals.column(j + 1));
+                }
+            }
+            let half = 0.5 * first.norm_squared();
+            if half.is_finite() { half } else { f64::MAX.sqrt() }
+        };
+        let x: Vec<f64> = at.iter().zip(&scale).map(|(p, s)| p / s).collect();
+        let limits: Vec<(f64, f64)> = bounds.iter().zip(&scale).map(|((lo, hi), s)| (lo / s, hi / s)).collect();
+        let no_constraints: [&dyn Func<()>; 0] = [];
+        let tolerances = StopTols { ftol_rel: 1e-9, ftol_abs: 1e-6, ..StopTols::default() };
+        let (x, value) = match minimize(objective, &x, &limits, &no_constraints, (), 300, Some(tolerances)) {
+            Ok((_, x, value)) | Err((_, x, value)) => (x, value),
+        };
+        let next = unscale(&x);
+        if !value.is_finite() || next.iter().any(|p| !p.is_finite()) {
+            break;
+        }
+        let gain = best - value;
+        if gain > 0.0 {
+            best = value;
+            at = next.iter().zip(bounds).map(|(p, (lo, hi))| p.clamp(*lo, *hi)).collect();
+        }
+        if gain.abs() < 1e-4 * (1.0 + 1e-3 * best) || gain < 0.0 {
+            break;
+        }
+    }
+    best.is_finite().then_some((at, best))
+}
+
+/// Fit a model to the points. None when there are too few points or the weights cannot be formed.
+pub(super) fn fit(points: &Points, shape: &Shape) -> Option<Fit> {
+    if points.len() <= shape.parameters() {
+        return None;
+    }
+    let bounds = bounds(points, shape);
+    let rough = Weights::rough(points);
+    let mut found: Vec<(Vec<f64>, f64)> =
+        starts(points, shape).iter().filter_map(|start| descend(points, shape, &rough, &bounds, start)).collect();
+    found.sort_by(|a, b| a.1.total_cmp(&b.1));
+    // different starts that arrived at the same place are one
+    found.dedup_by(|b, a| a.0.iter().zip(&b.0).all(|(a, b)| (a - b).abs() < 0.02));
+    let fits = found.iter().take(CARRIED).filter_map(|(start, _)| reweighted(points, shape, &bounds, start));
+    fits.min_by(|a, b| a.chi_square.total_cmp(&b.chi_square))
+}
+
+/// Alternate between weights at the parameters and parameters for the weights.
+fn reweighted(points: &Points, shape: &Shape, bounds: &[(f64, f64)], start: &[f64]) -> Option<Fit> {
+    let mut at = start.to_vec();
+    let mut last = None;
+    for _ in 0..REWEIGHTINGS {
+        let weights = Weights::exact(points, &shape.model(&at))?;
+        let (next, half) = descend(points, shape, &weights, bounds, &at)?;
+        let fit = finish(points, shape, &weights, bounds, next.clone(), 2.0 * half);
+        let moved = next
+            .iter()
+            .zip(&at)
+            .zip(&fit.log_sigmas)
+            .map(|((new, old), sigma)| ((new - old) / sigma.min(1.0)).abs())
+            .fold(0.0, f64::max);
+        at = next;
+        last = Some(fit);
+        if moved < 0.03 {
+            break;
+        }
+    }
+    last
+}
+
+fn finish(
+    points: &Points,
+    shape: &Shape,
+    weights: &Weights,
+    bounds: &[(f64, f64)],
+    log_parameters: Vec<f64>,
+    chi_square: f64,
+) -> Fit {
+    let residuals = weights.residuals(points, shape, &log_parameters);
+    let inside: Vec<usize> = (0..log_parameters.len())
+        .filter(|j| {
+            let (lo, hi) = bounds[*j];
+            log_parameters[*j] > lo + 1e-3 * (hi - lo) && log_parameters[*j] < hi - 1e-3 * (hi - lo)
+        })
+        .collect();
+    let jacobian = DMatrix::from_fn(points.len(), inside.len(), |i, j| residuals[(i, inside[j] + 1)]);
+    let mut log_sigmas = vec![f64::INFINITY; log_parameters.len()];
+    let information = jacobian.transpose() * &jacobian;
+    if let Some(inverse) = nalgebra::Cholesky::new(information).map(|c| c.inverse()) {
+        for (j, index) in inside.iter().enumerate() {
+            log_sigmas[*index] = inverse[(j, j)].sqrt();
+        }
+    }
+    Fit { shape: shape.clone(), log_parameters, log_sigmas, chi_square, points: points.len() }
+}
+
+/// The smallest sum of squares when a term of this coefficient is added to the model and all other parameters stay but the
+/// white density, which is fitted again: how well the log tolerates the term.
+pub(super) fn tolerated(points: &Points, fit: &Fit, kind: Kind, log_coefficient: f64) -> Option<f64> {
+    let shape = fit.shape.with(kind);
+    let mut fitted = fit.log_parameters.iter().copied();
+    let mut start = Vec::new();
+    let mut added = false;
+    for (k, role) in shape.roles() {
+        let here = k == kind && role == Role::Coefficient && !added;
+        added |= here;
+        start.push(if here { log_coefficient } else { fitted.next()? });
+    }
+    let free = |k: Kind| if k == Kind::White { 1.0 } else { 1e-9 };
+    let bounds: Vec<(f64, f64)> =
+        shape.roles().iter().zip(&start).map(|((k, _), p)| (p - free(*k), p + free(*k))).collect();
+    let weights = Weights::exact(points, &shape.model(&start))?;
+    descend(points, &shape, &weights, &bounds, &start).map(|(_, half)| 2.0 * half)
+}

@@ -2,8 +2,10 @@
 
 use kfdesign::model::discretize::{angle_and_drift, van_loan};
 use kfdesign::model::observability::{observability, undriven_states};
-use kfdesign::model::{LinearModel, ModelError, Named, Plant};
+use kfdesign::model::{InitialBias, LinearModel, ModelError, Named, Plant, augment};
+use kfdesign::noise::{NoiseModel, Term};
 use kfdesign::numerics::linalg::{cholesky_semidefinite, relative_to_diagonal};
+use kfdesign::units::Quantity;
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 
@@ -260,4 +262,99 @@ fn a_plant_is_known_by_its_name() {
         assert_eq!(Plant::parse(plant.name()), Ok(plant));
     }
     assert_eq!(Plant::parse("rocket").unwrap_err().to_string(), "unknown plant 'rocket'; known plants: static");
+}
+
+fn bias(mean: f64, std_dev: f64) -> Option<InitialBias> {
+    Some(InitialBias { mean, std_dev })
+}
+
+#[test]
+fn augmentation_names_every_state_and_keeps_blocks_apart() {
+    let noise = NoiseModel {
+        terms: vec![
+            Term::RateRandomWalk { density: 1e-5 },
+            Term::GaussMarkov { std_dev: 2e-4, correlation_time: 50.0 },
+            Term::White { density: 3e-3 },
+            Term::GaussMarkov { std_dev: 5e-4, correlation_time: 200.0 },
+            Term::White { density: 4e-3 },
+            Term::RateRamp { slope: 1e-7 },
+            Term::Quantization { coefficient: 1e-6 },
+        ],
+    };
+    let model = augment(Plant::Static, Quantity::AngularRate, &noise, bias(0.01, 0.2), 0.1, 1e4).unwrap();
+    let states: Vec<(&str, &str)> = model.states.iter().map(|s| (s.name.as_str(), s.unit.as_str())).collect();
+    assert_eq!(
+        states,
+        [
+            ("bias", "rad/s"),
+            ("quantization", "rad"),
+            ("quantization.previous", "rad"),
+            ("gauss_markov", "rad/s"),
+            ("gauss_markov.2", "rad/s"),
+            ("rate_random_walk", "rad/s"),
+            ("rate_ramp", "rad/s"),
+            ("rate_ramp.slope", "rad/s^2"),
+        ]
+    );
+    assert_eq!(model.measurements, [Named { name: "angular_rate".into(), unit: "rad/s".into() }]);
+    assert!((model.r[(0, 0)] - 25e-6 / 0.1).abs() < 1e-18, "(3² + 4²) 10⁻⁶/dt");
+    assert_eq!((model.x0[0], model.p0[(0, 0)]), (0.01, 0.2 * 0.2));
+    assert_eq!(model.x0.rows(1, 7).amax(), 0.0);
+    assert_eq!(model.h.row(0).iter().copied().collect::<Vec<_>>(), [1.0, 10.0, -10.0, 1.0, 1.0, 1.0, 1.0, 0.0]);
+    // Diagonal of F: exp(−dt/Tc); the ramp's slope feeds its value and nothing else is coupled.
+    assert!((model.f[(3, 3)] - (-0.1_f64 / 50.0).exp()).abs() < 1e-16);
+    assert!((model.q[(4, 4)] / (25e-8 * -(-0.2_f64 / 200.0).exp_m1()) - 1.0).abs() < 1e-14);
+    let coupled: Vec<(usize, usize)> =
+        (0..64).map(|k| (k / 8, k % 8)).filter(|&(i, j)| i != j && model.f[(i, j)] != 0.0).collect();
+    assert_eq!(coupled, [(2, 1), (6, 7)]);
+    assert_eq!(model.q[(0, 0)], 0.0);
+    assert!(model.check().is_ok());
+
+    let force = augment(Plant::Static, Quantity::SpecificForce, &noise, None, 0.1, 1e4).unwrap();
+    assert_eq!((force.states[0].unit.as_str(), force.states[6].unit.as_str()), ("m/s", "m/s^3"));
+    assert_eq!(force.states.len(), 7);
+}
+
+#[test]
+fn augmented_model_has_the_autocovariance_of_its_terms() {
+    let terms = vec![
+        Term::White { density: 2e-3 },
+        Term::GaussMarkov { std_dev: 1e-3, correlation_time: 3.0 },
+        Term::GaussMarkov { std_dev: 2e-3, correlation_time: 0.4 },
+        Term::Quantization { coefficient: 1e-5 },
+    ];
+    let dt = 0.05;
+    let noise = NoiseModel { terms: terms.clone() };
+    let model = augment(Plant::Static, Quantity::AngularRate, &noise, None, dt, 1e3).unwrap();
+    // P0 of a stationary process is stationary: P = F P Fᵀ + Q.
+    let next = &model.f * &model.p0 * model.f.transpose() + &model.q;
+    assert!(relative_to_diagonal(&(&next - &model.p0), model.p0.diagonal().as_slice()) < 1e-14);
+    let mut cross = &model.p0 * model.h.transpose();
+    for lag in 0..100 {
+        let mut found = (&model.h * &cross)[0];
+        if lag == 0 {
+            found += model.r[0];
+        }
+        let expected: f64 = terms.iter().filter_map(|term| term.autocovariance(lag, dt)).sum();
+        let size = terms.iter().filter_map(|term| term.autocovariance(0, dt)).sum::<f64>();
+        assert!((found - expected).abs() < 1e-14 * size, "lag {lag}: {found:e} {expected:e}");
+        cross = &model.f * cross;
+    }
+}
+
+#[test]
+fn augmentation_refuses_what_no_filter_can_use() {
+    let drift = NoiseModel { terms: vec![Term::GaussMarkov { std_dev: 1e-3, correlation_time: 3.0 }] };
+    let built = |noise: &NoiseModel, dt, std_dev| {
+        augment(Plant::Static, Quantity::AngularRate, noise, bias(0.0, std_dev), dt, 1e3).map_err(|e| e.to_string())
+    };
+    assert_eq!(
+        built(&drift, 0.1, 1.0).unwrap_err(),
+        "there is no white noise: a filter needs a measurement noise density greater than zero"
+    );
+    let white = NoiseModel { terms: vec![Term::White { density: 1e-3 }] };
+    assert_eq!(built(&white, 0.0, 1.0).unwrap_err(), "dt is 0; expected a number greater than zero");
+    assert!(built(&white, f64::NAN, 1.0).is_err());
+    assert!(built(&white, 0.1, -1.0).is_err());
+    assert_eq!(built(&white, 0.1, 1.0).unwrap().states.len(), 1);
 }

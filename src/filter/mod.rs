@@ -2,6 +2,8 @@
 
 pub mod document;
 pub mod kalman;
+mod reading;
+mod rows;
 pub mod steady_state;
 
 pub use document::{AxisDesign, FilterDesign, FilterError};

@@ -103,11 +103,16 @@ fn unique(name: &str, taken: &[Named]) -> String {
     std::iter::once(name.to_owned()).chain(numbered).find(|candidate| free(candidate)).unwrap_or_default()
 }
 
-/// SI unit of a state: a slope is the quantity per second, every other state the quantity itself.
+/// SI unit of a state: quantisation errors are those of the integrated quantity, a slope is the quantity per second, every
+/// other state the quantity itself.
 fn unit(name: &str, quantity: Quantity) -> &'static str {
-    match quantity {
-        _ if !name.contains("slope") => quantity.si_unit(),
-        Quantity::AngularRate => "rad/s^2",
-        Quantity::SpecificForce => "m/s^3",
+    let (integral, itself, slope) = match quantity {
+        Quantity::AngularRate => ("rad", quantity.si_unit(), "rad/s^2"),
+        Quantity::SpecificForce => ("m/s", quantity.si_unit(), "m/s^3"),
+    };
+    match name {
+        _ if name.starts_with("quantization") => integral,
+        _ if name.contains("slope") => slope,
+        _ => itself,
     }
 }

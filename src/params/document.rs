@@ -253,7 +253,7 @@ pub(super) fn params(root: &Place<'_>) -> Result<Params, KeyError> {
     Ok(Params { quantity, sample_rate_hz, axes, source })
 }
 
-pub(super) fn quantity(place: &Place<'_>) -> Result<Quantity, KeyError> {
+pub(crate) fn quantity(place: &Place<'_>) -> Result<Quantity, KeyError> {
     match place.text()? {
         "angular-rate" => Ok(Quantity::AngularRate),
         "specific-force" => Ok(Quantity::SpecificForce),

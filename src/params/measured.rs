@@ -22,7 +22,7 @@ pub struct Measured {
 
 /// Which values make sense at a place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Range {
+pub(crate) enum Range {
     Any,
     Positive,
 }
@@ -41,7 +41,7 @@ impl Measured {
     }
 
     /// Reads either form and checks dimension and range.
-    pub(super) fn from_place(place: &Place<'_>, expected: Dimension, range: Range) -> Result<Measured, KeyError> {
+    pub(crate) fn from_place(place: &Place<'_>, expected: Dimension, range: Range) -> Result<Measured, KeyError> {
         let example = expected.example();
         let measured = match place.value() {
             Value::String(text) => short_form(text).map_err(|message| place.error(message)),

@@ -13,7 +13,9 @@ use std::path::Path;
 use crate::noise::{NoiseModel, Term};
 use crate::units::{Quantity, UnitError};
 
+pub(crate) use document::quantity;
 pub use measured::Measured;
+pub(crate) use measured::Range;
 use place::{KeyError, Place};
 
 /// One noise term as documented: kind with its coefficients as [`Measured`].

@@ -115,9 +115,9 @@ fn chain(fast: f64, per_decade: f64, slowest: f64) -> Vec<(f64, f64)> {
 }
 
 /// Three Gauss–Markov states in two decades of time constants from dt/3 to at least twice the horizon: the Allan variance is
-/// right to 0.6 % for dt ≤ τ ≤ horizon. Not exact: slower drift than that is left to the constant bias.
+/// right to 0.6 % for dt ≤ τ ≤ horizon (at least 30 dt). Not exact: slower drift than that is left to the constant bias.
 pub(super) fn realisation(coefficient: f64, dt: f64, horizon_s: f64) -> Realisation {
-    let nodes = chain(3.0, 1.5, 2.0 * (horizon_s / dt).clamp(1.0, 1e12));
+    let nodes = chain(3.0, 1.5, 2.0 * (horizon_s / dt).clamp(30.0, 1e12));
     let variance = coefficient * coefficient;
     let of = |f: &dyn Fn(f64, f64) -> f64| {
         DVector::from_iterator(nodes.len(), nodes.iter().map(|(x, v)| f(*x, variance * v)))
@@ -167,5 +167,39 @@ impl SamplePath for Path {
                 *value = *phi * *value + *drive * normal(&mut self.rng);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Largest relative error of the chain's Allan variance over m = 1 … last, ten points a decade.
+    fn worst(nodes: &[(f64, f64)], last: f64) -> f64 {
+        (0..=(10.0 * last.log10()).round() as i32)
+            .map(|k| {
+                let m = 10f64.powf(f64::from(k) / 10.0).round() as u64;
+                let sum: f64 = nodes.iter().map(|(x, v)| v * gauss_markov::allan_variance(1.0, 1.0 / x, m, 1.0)).sum();
+                (sum / allan_variance(1.0, m) - 1.0).abs()
+            })
+            .fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn chain_of_the_filter_is_right_to_its_stated_error() {
+        for horizon in [30.0, 77.0, 1e3, 2e3, 1e4, 3e5, 1e6, 2e6, 4e6, 1e8] {
+            let nodes = chain(3.0, 1.5, 2.0 * horizon);
+            let error = worst(&nodes, horizon);
+            assert!(error < 6e-3, "horizon {horizon} samples, {} states: {error}", nodes.len());
+            assert!(nodes.iter().all(|(_, variance)| *variance > 0.0));
+        }
+    }
+
+    #[test]
+    fn chain_of_the_sample_path_is_right_to_its_stated_error() {
+        let nodes = chain(12.0, 3.0, PATH_SLOWEST);
+        assert!(worst(&nodes, 1e8) < 1e-4, "{}", worst(&nodes, 1e8));
+        let level = nodes.iter().map(|(_, v)| v).sum::<f64>().sqrt();
+        assert!((2.6..2.9).contains(&level), "level {level} B");
     }
 }

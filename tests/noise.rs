@@ -319,8 +319,8 @@ mod realisation {
     fn has_the_allan_variance_of_the_process() {
         let fast = Term::GaussMarkov { std_dev: 0.03, correlation_time: 0.05 };
         for term in [fast, QUANTIZATION, RANDOM_WALK, RAMP, FLICKER] {
-            // flicker is a chain of states: 0.6 % between dt and the horizon
-            let tolerance = if term == FLICKER { 6e-3 } else { 1e-11 };
+            // flicker is a chain of states: 1 % between dt and the horizon
+            let tolerance = if term == FLICKER { 1e-2 } else { 1e-11 };
             for m in [1, 2, 3, 10, 30] {
                 let expected = term.allan_variance(m as u64, DT);
                 assert_relative(allan_variance(term, m, 30.0 * DT), expected, tolerance, &format!("{term:?} m = {m}"));
@@ -355,7 +355,7 @@ mod realisation {
             let n = r.names.len();
             assert_eq!((r.phi.shape(), r.q.shape(), r.p0.shape(), r.h.len()), ((n, n), (n, n), (n, n), n), "{term:?}");
         }
-        // two hours at 100 Hz: dt/3 to 4 h in steps of 10^(2/3)
+        // two hours at 100 Hz: dt/3 to 4 h in steps of at most 10^(2/3)
         assert_eq!(FLICKER.realisation(DT, 7200.0).unwrap().names.len(), 11);
     }
 }

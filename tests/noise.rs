@@ -293,3 +293,193 @@ mod second_difference {
         }
     }
 }
+
+mod realisation {
+    use super::*;
+
+    /// E z²/(2 m² dt²) of the samples h x_k, by propagating the covariance: the Allan variance of the state-space model.
+    fn allan_variance(term: Term, m: usize, horizon_s: f64) -> f64 {
+        let r = term.realisation(DT, horizon_s).unwrap();
+        let mut p = r.p0.clone();
+        let mut sum = 0.0;
+        for a in 0..2 * m {
+            let mut cross = &p * r.h.transpose();
+            for b in a..2 * m {
+                let sign = if (a < m) == (b < m) { 1.0 } else { -1.0 };
+                let twice = if a == b { 1.0 } else { 2.0 };
+                sum += sign * twice * (&r.h * &cross)[(0, 0)];
+                cross = &r.phi * cross;
+            }
+            p = &r.phi * p * r.phi.transpose() + &r.q;
+        }
+        sum / (2.0 * (m * m) as f64)
+    }
+
+    #[test]
+    fn has_the_allan_variance_of_the_process() {
+        let fast = Term::GaussMarkov { std_dev: 0.03, correlation_time: 0.05 };
+        for term in [fast, QUANTIZATION, RANDOM_WALK, RAMP, FLICKER] {
+            // flicker is a chain of states: 1 % between dt and the horizon
+            let tolerance = if term == FLICKER { 1e-2 } else { 1e-11 };
+            for m in [1, 2, 3, 10, 30] {
+                let expected = term.allan_variance(m as u64, DT);
+                assert_relative(allan_variance(term, m, 30.0 * DT), expected, tolerance, &format!("{term:?} m = {m}"));
+            }
+            assert_eq!(term.realisation(DT, 1.0).unwrap().exact, term != FLICKER);
+        }
+        assert!(WHITE.realisation(DT, 1.0).is_none());
+    }
+
+    /// h Φ^k P0 hᵀ is the autocovariance, and P0 the fixed point of the covariance recursion.
+    #[test]
+    fn starts_in_its_stationary_law() {
+        for term in [GAUSS_MARKOV, QUANTIZATION, FLICKER] {
+            let r = term.realisation(DT, 1000.0).unwrap();
+            let next: DMatrix<f64> = &r.phi * &r.p0 * r.phi.transpose() + &r.q;
+            assert!((&next - &r.p0).amax() <= 1e-15 * r.p0.amax(), "{term:?} is not stationary");
+            let mut x = &r.p0 * r.h.transpose();
+            for lag in 0..10 {
+                if let Some(expected) = term.autocovariance(lag, DT) {
+                    let scale = term.autocovariance(0, DT).unwrap();
+                    assert!(((&r.h * &x)[(0, 0)] - expected).abs() < 1e-14 * scale, "{term:?} at lag {lag}");
+                }
+                x = &r.phi * x;
+            }
+        }
+    }
+
+    #[test]
+    fn sizes_agree() {
+        for term in ALL {
+            let Some(r) = term.realisation(DT, 7200.0) else { continue };
+            let n = r.names.len();
+            assert_eq!((r.phi.shape(), r.q.shape(), r.p0.shape(), r.h.len()), ((n, n), (n, n), (n, n), n), "{term:?}");
+        }
+        // two hours at 100 Hz: dt/3 to 4 h in steps of at most 10^(2/3)
+        assert_eq!(FLICKER.realisation(DT, 7200.0).unwrap().names.len(), 11);
+    }
+}
+
+mod sample_path {
+    use super::*;
+    use kfdesign::numerics::distribution::chi_square_quantile;
+
+    fn path(term: Term, seed: u64, n: usize) -> Vec<f64> {
+        let mut y = vec![0.0; n];
+        term.sample_path(DT, rng(seed)).fill(&mut y);
+        y
+    }
+
+    /// Overlapping Allan variance and the equivalent degrees of freedom of that estimate.
+    fn estimate(term: Term, y: &[f64], m: usize) -> (f64, f64) {
+        let mut theta = vec![0.0; y.len() + 1];
+        for (k, y) in y.iter().enumerate() {
+            theta[k + 1] = theta[k] + y * DT;
+        }
+        let count = y.len() + 1 - 2 * m;
+        let sum: f64 = (0..count).map(|k| (theta[k + 2 * m] - 2.0 * theta[k + m] + theta[k]).powi(2)).sum();
+        let r = |h: usize| term.second_difference_autocovariance(m as u64, h as u64, DT);
+        let tail: f64 = (1..count).map(|h| (count - h) as f64 * r(h).powi(2)).sum();
+        let edf = (count as f64 * r(0)).powi(2) / (count as f64 * r(0).powi(2) + 2.0 * tail);
+        (sum / count as f64 / (2.0 * (m as f64 * DT).powi(2)), edf)
+    }
+
+    /// False alarm: 1e-6 for each of the 24 points (chi-square with at least 130 equivalent degrees of freedom).
+    #[test]
+    fn has_the_allan_curve() {
+        let fast = Term::GaussMarkov { std_dev: 0.03, correlation_time: 0.05 };
+        for (seed, term) in [WHITE, GAUSS_MARKOV, fast, QUANTIZATION, FLICKER, RANDOM_WALK].into_iter().enumerate() {
+            let y = path(term, seed as u64, 200_000);
+            for m in [1, 4, 40, 400] {
+                let (found, edf) = estimate(term, &y, m);
+                let ratio = found / term.allan_variance(m as u64, DT);
+                let lower = chi_square_quantile(5e-7, edf) / edf;
+                let upper = chi_square_quantile(1.0 - 5e-7, edf) / edf;
+                assert!(edf > 130.0);
+                assert!(
+                    (lower..upper).contains(&ratio),
+                    "{term:?} at m = {m}: {ratio} times theory, outside {lower}..{upper} (edf {edf})"
+                );
+            }
+        }
+    }
+
+    /// Flicker at one percent: 10⁶ samples, half widths of 0.7 and 0.9 %.
+    /// False alarm 1e-6 for each of two points.
+    #[test]
+    fn flicker_to_one_percent() {
+        let y = path(FLICKER, 77, 1_000_000);
+        for m in [1, 2] {
+            let (found, edf) = estimate(FLICKER, &y, m);
+            let ratio = found / FLICKER.allan_variance(m as u64, DT);
+            let half_width = 4.9 * (2.0 / edf).sqrt();
+            assert!(half_width < 0.01, "the test is too weak: {half_width}");
+            assert!((ratio - 1.0).abs() < half_width, "m = {m}: {ratio} times theory, allowed ±{half_width}");
+        }
+    }
+
+    /// Means of y_0 y_k over 20 000 independent paths against σ²φ^k: standard error σ² √((1 + φ^{2k})/20000), 5 of them.
+    /// False alarm 5.7e-7 for each of four lags; the first is the stationary start.
+    #[test]
+    fn gauss_markov_is_stationary_from_the_start() {
+        let (sigma, tc) = (0.03, 0.2);
+        let term = Term::GaussMarkov { std_dev: sigma, correlation_time: tc };
+        let runs = 20_000;
+        let lags = [0, 1, 10, 40];
+        let mut sums = [0.0; 4];
+        for run in 0..runs {
+            let y = path(term, run, 41);
+            for (sum, lag) in sums.iter_mut().zip(lags) {
+                *sum += y[0] * y[lag];
+            }
+        }
+        for (sum, lag) in sums.iter().zip(lags) {
+            let phi = (-(lag as f64) * DT / tc).exp();
+            let deviation = sum / runs as f64 / (sigma * sigma) - phi;
+            let allowed = 5.0 * ((1.0 + phi * phi) / runs as f64).sqrt();
+            assert!(deviation.abs() < allowed, "lag {lag}: off by {deviation}, allowed {allowed}");
+        }
+    }
+
+    /// Var y_k = K² k dt over 10 000 paths; chi-square, false alarm 1e-6 for each of two points.
+    #[test]
+    fn random_walk_starts_at_zero_and_spreads() {
+        let runs = 10_000;
+        let mut squares = [0.0; 2];
+        for run in 0..runs {
+            let y = path(RANDOM_WALK, run, 31);
+            assert_eq!(y[0], 0.0);
+            squares[0] += y[1] * y[1];
+            squares[1] += y[30] * y[30];
+        }
+        for (sum, k) in squares.iter().zip([1.0, 30.0]) {
+            let ratio = sum / (2.85e-3f64.powi(2) * k * DT);
+            let dof = runs as f64;
+            assert!(
+                (chi_square_quantile(5e-7, dof)..chi_square_quantile(1.0 - 5e-7, dof)).contains(&ratio),
+                "at step {k}: {ratio} against {dof}"
+            );
+        }
+    }
+
+    #[test]
+    fn ramp_is_a_ramp() {
+        let y = path(RAMP, 1, 100_001);
+        assert_eq!(y[0], 0.0);
+        assert_relative(y[100_000], 2e-4 * 1000.0, 1e-14, "ramp after 1000 s");
+        assert_relative(path(Term::RateRamp { slope: -1.0 }, 1, 2)[1], -DT, 1e-15, "falling ramp");
+    }
+
+    #[test]
+    fn twice_n_is_two_n() {
+        for term in ALL {
+            let whole = path(term, 3, 1000);
+            let mut generator = term.sample_path(DT, rng(3));
+            let mut parts = vec![0.0; 1000];
+            for part in parts.chunks_mut(77) {
+                generator.fill(part);
+            }
+            assert_eq!(whole, parts, "{term:?}");
+        }
+    }
+}

@@ -6,7 +6,7 @@ use super::TauGrid;
 ///
 /// * octave: 1, 2, 4, 8 …
 /// * decade: 1, 2, 4, 10, 20, 40, 100 … (the grid of that name in Stable32 and NIST SP 1065)
-/// * log(k): k points per decade, 10^(i/k) rounded to integers (k = 0 counts as 1)
+/// * log(k): k points per decade, 10^(i/k) rounded to integers (k from 1 to 10 000)
 /// * all: every integer; a whole curve then costs O(n²)
 pub fn averaging_factors(grid: TauGrid, largest: u64) -> Vec<u64> {
     let all = 1..=largest;
@@ -18,9 +18,9 @@ pub fn averaging_factors(grid: TauGrid, largest: u64) -> Vec<u64> {
             .take_while(|m| all.contains(m))
             .collect(),
         TauGrid::Log(per_decade) => {
-            let per_decade = per_decade.max(1) as f64;
-            let mut factors: Vec<u64> = (0..)
-                .map(|i| 10_f64.powf(f64::from(i) / per_decade).round() as u64)
+            let per_decade = per_decade.clamp(1, 10_000) as u32;
+            let mut factors: Vec<u64> = (0..20 * per_decade)
+                .map(|i| 10_f64.powf(f64::from(i) / f64::from(per_decade)).round() as u64)
                 .take_while(|m| all.contains(m))
                 .collect();
             factors.dedup();

@@ -92,32 +92,39 @@ fn digamma_half(l: u128) -> f64 {
     psi
 }
 
-/// Nodes x = dt/Tc (fast to slow) with their variances for B = 1: trapezoidal rule in ln x from `fast` down to x ≤ 1/`slowest`.
-/// The fastest variance is set so that the Allan variance at m = 1 is exact, the slowest also drives for all slower ones.
-fn chain(fast: f64, per_decade: f64, slowest: f64) -> Vec<(f64, f64)> {
-    let step = std::f64::consts::LN_10 / per_decade;
-    let count = ((fast * slowest).max(1.0).ln() / step).ceil() as usize + 1;
-    let mut nodes: Vec<(f64, f64)> = (0..count)
+/// Nodes x = dt/Tc (fast to slow) with their variances for B = 1: trapezoidal rule in ln x from `fast` to a time constant of
+/// twice the horizon, at least `per_decade` of them. The two end variances, which also stand for what lies beyond the ends,
+/// are set so that the Allan variance is exact at m = 1 and at the horizon.
+fn chain(fast: f64, per_decade: f64, horizon: u64) -> Vec<(f64, f64)> {
+    let range = (fast * 2.0 * horizon as f64).ln();
+    let steps = (range * per_decade / std::f64::consts::LN_10).ceil().max(1.0);
+    let step = range / steps;
+    let mut nodes: Vec<(f64, f64)> = (0..=steps as usize)
         .map(|k| {
             let x = fast * (-(k as f64) * step).exp();
             (x, step * x / (2.0 * PI * (0.5 * x).sinh()))
         })
         .collect();
-    if let Some(last) = nodes.last_mut() {
-        last.1 += (-0.5 * step).exp() / PI;
-    }
-    let first_point = |x: f64| gauss_markov::allan_variance(1.0, 1.0, 1, x);
-    let missing = 2.0 / PI - nodes.iter().map(|(x, variance)| variance * first_point(*x)).sum::<f64>();
-    if let Some(first) = nodes.first_mut() {
-        first.1 += missing / first_point(first.0);
+    let missing = |m: u64| {
+        let chain: f64 =
+            nodes.iter().map(|(x, variance)| variance * gauss_markov::allan_variance(1.0, 1.0, m, *x)).sum();
+        allan_variance(1.0, m) - chain
+    };
+    let (at_1, at_horizon) = (missing(1), missing(horizon));
+    if let [first, .., last] = nodes.as_mut_slice() {
+        let of = |x: f64, m: u64| gauss_markov::allan_variance(1.0, 1.0, m, x);
+        let (a, b, c, d) = (of(first.0, 1), of(last.0, 1), of(first.0, horizon), of(last.0, horizon));
+        let determinant = a * d - b * c;
+        first.1 += (d * at_1 - b * at_horizon) / determinant;
+        last.1 += (a * at_horizon - c * at_1) / determinant;
     }
     nodes
 }
 
-/// Three Gauss–Markov states in two decades of time constants from dt/3 to at least twice the horizon: the Allan variance is
-/// right to 0.6 % for dt ≤ τ ≤ horizon. Not exact: slower drift than that is left to the constant bias.
+/// Three Gauss–Markov states in two decades of time constants, from dt/3 to twice the horizon: the Allan variance is
+/// right to 1 % for dt ≤ τ ≤ horizon (at least 30 dt). Not exact: slower drift than that is left to the constant bias.
 pub(super) fn realisation(coefficient: f64, dt: f64, horizon_s: f64) -> Realisation {
-    let nodes = chain(3.0, 1.5, 2.0 * (horizon_s / dt).clamp(1.0, 1e12));
+    let nodes = chain(3.0, 1.5, (horizon_s / dt).clamp(30.0, 1e12) as u64);
     let variance = coefficient * coefficient;
     let of = |f: &dyn Fn(f64, f64) -> f64| {
         DVector::from_iterator(nodes.len(), nodes.iter().map(|(x, v)| f(*x, variance * v)))
@@ -134,11 +141,11 @@ pub(super) fn realisation(coefficient: f64, dt: f64, horizon_s: f64) -> Realisat
     }
 }
 
-/// Slowest time constant of the sample path, in samples.
-const PATH_SLOWEST: f64 = 1e10;
+/// Up to this many samples the sample path is right; its slowest time constant is twice that.
+const PATH_HORIZON: u64 = 5_000_000_000;
 
 /// A sum of Gauss–Markov processes, three a decade, from dt/12 to 10¹⁰ samples, each with stationary start: the Allan
-/// variance is right to 1e-4 up to 10⁸ samples. The level of the path is arbitrary (standard deviation about 2.8 B).
+/// variance is right to 1e-3 up to 10⁸ samples. The level of the path is arbitrary (standard deviation about 2.8 B).
 pub(super) struct Path {
     /// (value, φ, driving standard deviation), fast to slow.
     states: Vec<(f64, f64, f64)>,
@@ -147,7 +154,7 @@ pub(super) struct Path {
 
 impl Path {
     pub(super) fn new(coefficient: f64, mut rng: ChaCha8Rng) -> Self {
-        let states = chain(12.0, 3.0, PATH_SLOWEST)
+        let states = chain(12.0, 3.0, PATH_HORIZON)
             .into_iter()
             .map(|(x, variance)| {
                 let std_dev = coefficient * variance.sqrt();
@@ -167,5 +174,40 @@ impl SamplePath for Path {
                 *value = *phi * *value + *drive * normal(&mut self.rng);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Largest relative error of the chain's Allan variance over m = 1 … last, ten points a decade.
+    fn worst(nodes: &[(f64, f64)], last: f64) -> f64 {
+        (0..=(10.0 * last.log10()).round() as i32)
+            .map(|k| {
+                let m = 10f64.powf(f64::from(k) / 10.0).round() as u64;
+                let sum: f64 = nodes.iter().map(|(x, v)| v * gauss_markov::allan_variance(1.0, 1.0 / x, m, 1.0)).sum();
+                (sum / allan_variance(1.0, m) - 1.0).abs()
+            })
+            .fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn chain_of_the_filter_is_right_to_its_stated_error() {
+        for k in 0..66 {
+            let horizon = 10f64.powf(1.5 + 0.1 * f64::from(k)).round() as u64;
+            let nodes = chain(3.0, 1.5, horizon);
+            let error = worst(&nodes, horizon as f64);
+            assert!(error < 1e-2, "horizon {horizon} samples, {} states: {error}", nodes.len());
+            assert!(nodes.iter().all(|(_, variance)| *variance > 0.0));
+        }
+    }
+
+    #[test]
+    fn chain_of_the_sample_path_is_right_to_its_stated_error() {
+        let nodes = chain(12.0, 3.0, PATH_HORIZON);
+        assert!(worst(&nodes, 1e8) < 1e-3, "{}", worst(&nodes, 1e8));
+        let level = nodes.iter().map(|(_, v)| v).sum::<f64>().sqrt();
+        assert!((2.7..2.9).contains(&level), "level {level} B");
     }
 }

@@ -138,7 +138,7 @@ impl Term {
     }
 
     /// State-space form for the filter; None for white noise (it is measurement noise, variance density²/dt).
-    /// `horizon_s` is used by flicker only: its Allan variance is right to 0.6 % up to there.
+    /// `horizon_s` is used by flicker only: its Allan variance is right to 1 % up to there.
     pub fn realisation(&self, dt: f64, horizon_s: f64) -> Option<Realisation> {
         match *self {
             Term::Quantization { coefficient } => Some(quantization::realisation(coefficient, dt)),
@@ -153,7 +153,7 @@ impl Term {
     }
 
     /// Discrete path, exact in law, with stationary start; the random walk and the ramp start at 0. Flicker is a sum of
-    /// Gauss–Markov paths whose Allan variance is right to 1e-4.
+    /// Gauss–Markov paths whose Allan variance is right to 1e-3.
     pub fn sample_path(&self, dt: f64, rng: ChaCha8Rng) -> Box<dyn SamplePath + Send> {
         match *self {
             Term::Quantization { coefficient } => Box::new(quantization::Path::new(coefficient, dt, rng)),

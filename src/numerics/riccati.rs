@@ -47,9 +47,7 @@ pub fn dare_doubling(
     Err(LinalgError::NoConvergence { iterations: MAX_DOUBLINGS, residual: change })
 }
 
-/// P(k|k−1) at k = 2^doublings when P(0|−1) is `p0`, from the same doubling; needs no stability.
-///
-/// P_k = X + Aᵀ P0 (I + G P0)⁻¹ A, with P0 = L Lᵀ as X + Aᵀ L (I + Lᵀ G L)⁻¹ Lᵀ A. Errors: shapes, R not definite, P0 indefinite.
+/// P(k|k−1) at k = 2^doublings when P(0|−1) is `p0`, from the same doubling; needs no stability. Errors: shapes, R not definite, P0 indefinite.
 pub fn covariance_after(
     f: &DMatrix<f64>,
     h: &DMatrix<f64>,
@@ -63,17 +61,13 @@ pub fn covariance_after(
     for _ in 0..doublings {
         flow.double()?;
     }
-    let l = cholesky_semidefinite(p0)?;
-    let inner = DMatrix::<f64>::identity(l.nrows(), l.nrows()) + l.transpose() * &flow.g * &l;
-    let l_a = l.transpose() * &flow.a;
-    let mut p = flow.x + l_a.transpose() * solve_spd(&inner, &l_a)?;
-    symmetrise(&mut p);
-    Ok(p)
+    flow.apply(p0)
 }
 
 /// The Riccati recursion over 2^k steps, P → X + Aᵀ P (I + G P)⁻¹ A: A is the transposed closed-loop transition from P = 0,
 /// X the covariance reached from P = 0, G the information gathered about the start.
-struct Flow {
+#[derive(Clone, Debug)]
+pub struct Flow {
     a: DMatrix<f64>,
     g: DMatrix<f64>,
     x: DMatrix<f64>,
@@ -81,12 +75,27 @@ struct Flow {
 
 impl Flow {
     /// Checks the shapes; one step.
-    fn one_step(f: &DMatrix<f64>, h: &DMatrix<f64>, q: &DMatrix<f64>, r: &DMatrix<f64>) -> Result<Flow, LinalgError> {
+    pub fn one_step(
+        f: &DMatrix<f64>,
+        h: &DMatrix<f64>,
+        q: &DMatrix<f64>,
+        r: &DMatrix<f64>,
+    ) -> Result<Flow, LinalgError> {
         Ok(Flow { a: f.transpose(), g: information(f, h, q, r)?, x: q.clone() })
     }
 
+    /// P(k|k−1) after these steps from P(0|−1) = `p0` = L Lᵀ: X + Aᵀ L (I + Lᵀ G L)⁻¹ Lᵀ A. Errors: P0 indefinite.
+    pub fn apply(&self, p0: &DMatrix<f64>) -> Result<DMatrix<f64>, LinalgError> {
+        let l = cholesky_semidefinite(p0)?;
+        let inner = DMatrix::<f64>::identity(l.nrows(), l.nrows()) + l.transpose() * &self.g * &l;
+        let l_a = l.transpose() * &self.a;
+        let mut p = &self.x + l_a.transpose() * solve_spd(&inner, &l_a)?;
+        symmetrise(&mut p);
+        Ok(p)
+    }
+
     /// Twice as many steps; returns what was added to X.
-    fn double(&mut self) -> Result<DMatrix<f64>, LinalgError> {
+    pub fn double(&mut self) -> Result<DMatrix<f64>, LinalgError> {
         let n = self.a.nrows();
         let w = DMatrix::<f64>::identity(n, n) + &self.g * &self.x;
         let w_a = solve(w.clone(), &self.a)?;

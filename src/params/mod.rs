@@ -11,7 +11,7 @@ pub mod place;
 use std::path::Path;
 
 use crate::noise::{NoiseModel, Term};
-use crate::units::{Quantity, UnitError};
+use crate::units::{Quantity, Unit, UnitError};
 
 pub(crate) use document::quantity;
 pub use measured::Measured;
@@ -109,6 +109,21 @@ impl TermEntry {
 }
 
 impl AxisParams {
+    /// The unit of the quantity in which the parameters of this axis are written, else deg/s or m/s^2.
+    pub fn display_unit(&self, quantity: Quantity) -> Unit {
+        let terms = self.terms.iter().filter_map(|term| match term {
+            TermEntry::GaussMarkov { std_dev, .. } => Some(std_dev),
+            TermEntry::BiasInstability { coefficient } => Some(coefficient),
+            _ => None,
+        });
+        let written = terms.chain(&self.turn_on_bias).chain(&self.bias).map(|m| m.unit.times_time(0)).next();
+        let usual = match quantity {
+            Quantity::AngularRate => "deg/s",
+            Quantity::SpecificForce => "m/s^2",
+        };
+        written.unwrap_or_else(|| Unit::parse(usual).unwrap_or_else(|_| Unit::one()))
+    }
+
     /// Reads an axis that stands in another document; `place` names where.
     pub fn from_place(place: &Place<'_>, quantity: Quantity) -> Result<AxisParams, KeyError> {
         document::axis(place, quantity)

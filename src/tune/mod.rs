@@ -1,1 +1,142 @@
 //! Noise parameters to a filter design: augmentation, steady state, predicted sigma(t), error budget (floor 4).
+//!
+//! `sensor` turns the parameters of an axis into a linear model (merging what no filter can tell apart), `prediction` propagates its
+//! covariance over any time, `closed_loop` splits the final variance into its causes and finds the bandwidth.
+
+mod closed_loop;
+mod flicker;
+mod prediction;
+mod sensor;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use serde_json::json;
+
+use crate::filter::steady_state::{SteadyStateError, steady_state};
+use crate::filter::{AxisDesign, FilterDesign};
+use crate::model::{ModelError, Plant};
+use crate::numerics::linalg::LinalgError;
+use crate::params::{AxisParams, Params};
+use crate::units::Quantity;
+
+pub use closed_loop::{Share, bandwidth_hz, error_budget};
+pub use flicker::FlickerApproximation;
+pub use prediction::{Predicted, predicted_sigma};
+
+/// Choices of [`tune`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TuneOptions {
+    pub plant: Plant,
+    /// Slowest time constant, s, that the approximation of flicker covers.
+    pub flicker_horizon_s: f64,
+}
+
+impl Default for TuneOptions {
+    fn default() -> TuneOptions {
+        TuneOptions { plant: Plant::Static, flicker_horizon_s: 10_000.0 }
+    }
+}
+
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum TuneError {
+    #[error(
+        "axis '{axis}': no measurement noise: the parameters have no 'white' density, so the best filter would follow every sample; \
+         give axes[].white.density (its unit is like deg/s/sqrt(Hz))"
+    )]
+    NoMeasurementNoise { axis: String },
+    #[error("axis '{axis}': {source}")]
+    Model { axis: String, source: ModelError },
+    #[error("axis '{axis}': {source}")]
+    SteadyState { axis: String, source: SteadyStateError },
+    #[error("axis '{axis}': {source}")]
+    Linalg { axis: String, source: LinalgError },
+}
+
+/// What a design promises for one axis, SI units.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct AxisReport {
+    pub name: String,
+    /// What the measurements can tell, in sentences.
+    pub observability: Vec<String>,
+    /// Standard deviations of the estimation errors over time.
+    pub predicted: Predicted,
+    /// Four time constants of the slowest closed-loop pole of the driven states, s.
+    pub settling_time_s: f64,
+    /// Time after which the predicted sigma of the whole drift stays within 5 % of its final value; absent when there is none.
+    pub drift_settling_time_s: Option<f64>,
+    /// Frequency at which the estimate follows the drift with half the power it has at rest; absent when the filter follows no drift.
+    pub bandwidth_hz: Option<f64>,
+    /// Causes of the final variance of the drift estimate; the shares sum to one. Empty when that variance tends to zero.
+    pub error_budget: Vec<Share>,
+    /// Present when flicker is approximated.
+    pub flicker: Option<FlickerApproximation>,
+    /// What was decided where the parameters left a choice.
+    pub warnings: Vec<String>,
+}
+
+/// A design with what it promises.
+#[derive(Clone, Debug)]
+pub struct Tuned {
+    pub design: FilterDesign,
+    pub reports: Vec<AxisReport>,
+}
+
+/// The augmented Kalman filter of every axis of `params`.
+///
+/// States are the constant bias and those of each drift process, discretised exactly; R = N²/dt; P0 of the bias is the turn-on bias, that
+/// of a process its stationary variance. A rate random walk has the same dynamics as the constant bias and shares its state;
+/// flicker is a chain of Gauss-Markov states.
+/// Errors: no white noise, or a model without a steady state.
+pub fn tune(params: &Params, options: &TuneOptions) -> Result<Tuned, TuneError> {
+    let mut axes = Vec::with_capacity(params.axes.len());
+    let mut reports = Vec::with_capacity(params.axes.len());
+    for axis in &params.axes {
+        let (design, report) = tune_axis(axis, params.quantity, params.sample_rate_hz, options)?;
+        axes.push(design);
+        reports.push(report);
+    }
+    let decisions: Vec<_> = reports.iter().map(|r| json!({ "axis": r.name, "decisions": r.warnings })).collect();
+    let design = FilterDesign {
+        quantity: params.quantity,
+        sample_rate_hz: params.sample_rate_hz,
+        plant: options.plant.name().to_string(),
+        axes,
+        tuning: json!({
+            "method": "exact discretisation of the documented noise terms; nothing is fitted",
+            "objective": "least mean square error of every state",
+            "axes": decisions,
+        }),
+    };
+    Ok(Tuned { design, reports })
+}
+
+fn tune_axis(
+    axis: &AxisParams,
+    quantity: Quantity,
+    sample_rate_hz: f64,
+    options: &TuneOptions,
+) -> Result<(AxisDesign, AxisReport), TuneError> {
+    let dt = 1.0 / sample_rate_hz;
+    let sensor = sensor::build(axis, quantity, dt, options)?;
+    let steady =
+        steady_state(&sensor.model).map_err(|source| TuneError::SteadyState { axis: axis.name.clone(), source })?;
+    let failed = |source| TuneError::Linalg { axis: axis.name.clone(), source };
+    let error_budget = error_budget(&sensor.model, &steady).map_err(failed)?;
+    let final_sigma = error_budget.iter().map(|s| s.variance_si).sum::<f64>().sqrt();
+    let predicted = predicted_sigma(&sensor.model, steady.settling_time).map_err(failed)?;
+    let drift_settling_time_s =
+        prediction::drift_settling_time(&sensor.model, &predicted, final_sigma).map_err(failed)?;
+    let report = AxisReport {
+        name: axis.name.clone(),
+        observability: sensor::observability_sentences(&sensor.model).map_err(failed)?,
+        predicted,
+        settling_time_s: steady.settling_time,
+        drift_settling_time_s,
+        bandwidth_hz: bandwidth_hz(&sensor.model, &steady),
+        error_budget,
+        flicker: sensor.flicker,
+        warnings: sensor.warnings,
+    };
+    let design = AxisDesign { name: axis.name.clone(), model: sensor.model, steady_state: steady, noise: axis.clone() };
+    Ok((design, report))
+}

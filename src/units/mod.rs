@@ -82,6 +82,10 @@ impl Unit {
     pub fn parse(text: &str) -> Result<Unit, UnitError> {
         parse::unit(text)
     }
+    /// The unit of plain numbers.
+    pub fn one() -> Unit {
+        Unit::of_factors(Vec::new())
+    }
     pub fn text(&self) -> &str {
         &self.text
     }

@@ -1,0 +1,138 @@
+//! Figures and the report page of a design.
+
+use super::text::{self, Group, View, shown};
+use crate::cli::output::digits;
+use crate::replay::ReplayResult;
+use crate::report::figure::{self, BudgetItem, Sigma, SigmaState};
+use crate::report::page::{Badge, Page, Section};
+use crate::units::Quantity;
+
+/// Predicted sigma of every axis, one below the other.
+pub(super) fn sheet(view: &View<'_>) -> String {
+    let figures: Vec<String> = view.groups().iter().map(|g| sigma(g, view.params.quantity)).collect();
+    figure::sheet("Tuned filter", &figures)
+}
+
+/// The report page.
+pub(super) fn page(view: &View<'_>, replay: Option<&ReplayResult>) -> Page {
+    let (params, outcome) = (view.params, view.verification);
+    let mut provenance = vec![
+        ("parameters".to_string(), view.name.to_string()),
+        ("plant".to_string(), view.tuned.design.plant.clone()),
+        ("sample rate".to_string(), format!("{} Hz", digits(params.sample_rate_hz))),
+        ("seed".to_string(), outcome.seed.to_string()),
+        ("version".to_string(), format!("kfdesign {}", env!("CARGO_PKG_VERSION"))),
+    ];
+    if let Some(note) = params.source.as_ref().and_then(|s| s.note.clone()) {
+        provenance.push(("source of the parameters".to_string(), note));
+    }
+    let mut sections: Vec<Section> = view.groups().iter().map(|g| section(g, params.quantity)).collect();
+    let header = text::verification_header(outcome);
+    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+    let tests = outcome.tests.iter().map(|t| {
+        vec![
+            t.axis.clone(),
+            t.name.clone(),
+            digits(t.statistic),
+            digits(t.lower),
+            digits(t.upper),
+            digits(t.adjusted_p_value),
+            if t.pass { "pass" } else { "FAIL" }.to_string(),
+        ]
+    });
+    sections.push(
+        Section::new("Verification by Monte Carlo")
+            .paragraph(text::verification_sentence(outcome, params.sample_rate_hz))
+            .table(
+                "Mean NEES per state and mean NIS: 1 when the covariance is right",
+                &header,
+                text::verification_rows(outcome),
+            )
+            .table(
+                format!(
+                    "Tests: bounds at {} %, each alone; p adjusted for all {} tests (Holm)",
+                    digits(100.0 * (1.0 - outcome.alpha)),
+                    outcome.tests.len()
+                ),
+                &["axis", "test", "statistic", "lower", "upper", "p", "result"],
+                tests.collect(),
+            ),
+    );
+    if let Some(result) = replay {
+        sections.push(Section::new("Replay of a log").paragraph(text::replay(result).trim().to_string()));
+    }
+    Page {
+        title: format!("Kalman filter from {}", view.name),
+        subtitle: "Augmented bias filter: model, steady state, error budget, predicted accuracy".to_string(),
+        badge: Some(Badge::new(outcome.verdict, text::verification_sentence(outcome, params.sample_rate_hz))),
+        provenance,
+        sections,
+    }
+}
+
+fn section(group: &Group<'_>, quantity: Quantity) -> Section {
+    let header = text::sigma_header(group);
+    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+    let facts = text::facts(group).into_iter().map(|(label, value)| vec![label.to_string(), value]);
+    let mut section = Section::new(group.title())
+        .table("States", &text::STATES, text::state_rows(group, quantity))
+        .table("Measurement and loop", &["what", "value"], facts.collect())
+        .list(group.report.observability.clone());
+    for warning in &group.report.warnings {
+        section = section.warning(warning.clone());
+    }
+    let mut figures =
+        vec![(sigma(group, quantity), "What the filter promises, from the first measurement on.".to_string())];
+    if !group.report.error_budget.is_empty() {
+        figures.push((budget(group), "Causes of the final variance of the drift estimate.".to_string()));
+    }
+    section.figures(figures).table(
+        "Predicted sigma of the estimation errors",
+        &header,
+        text::sigma_rows(group, quantity),
+    )
+}
+
+fn sigma(group: &Group<'_>, quantity: Quantity) -> String {
+    let (model, predicted) = (&group.design.model, &group.report.predicted);
+    let mut states: Vec<SigmaState> = Vec::new();
+    for i in text::told(model) {
+        let sigma = &predicted.sigma[i];
+        if model.states[i].unit == quantity.si_unit() {
+            let scale = shown(model, i, quantity, &group.unit).0;
+            let steady = group.design.steady_state.predicted_covariance[(i, i)];
+            states.push(SigmaState {
+                name: model.states[i].name.clone(),
+                sigma: sigma.iter().map(|s| s / scale).collect(),
+                steady: (steady > 0.0).then(|| steady.sqrt() / scale),
+            });
+        }
+    }
+    if model.states.len() > 1 {
+        let variance: f64 = group.report.error_budget.iter().map(|s| s.variance_si).sum();
+        let final_sigma = (variance > 0.0).then(|| group.unit.from_si(variance.sqrt()));
+        let total = predicted.total.iter().map(|s| group.unit.from_si(*s)).collect();
+        states.push(SigmaState { name: "whole drift".into(), sigma: total, steady: final_sigma });
+    }
+    figure::sigma(&Sigma {
+        title: format!("{}: predicted sigma", group.title()),
+        unit: group.unit.to_string(),
+        time_s: predicted.time_s.clone(),
+        states,
+        settling_time_s: group.report.drift_settling_time_s,
+    })
+}
+
+fn budget(group: &Group<'_>) -> String {
+    let items: Vec<BudgetItem> = group
+        .report
+        .error_budget
+        .iter()
+        .map(|share| BudgetItem {
+            source: share.source.clone(),
+            share: share.share,
+            value: format!("{} {}", digits(group.unit.from_si(share.variance_si.sqrt())), group.unit),
+        })
+        .collect();
+    figure::error_budget(&format!("{}: error budget", group.title()), &items)
+}

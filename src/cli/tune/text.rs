@@ -1,0 +1,312 @@
+//! A design as a person reads it.
+
+use crate::cli::output::{digits, table};
+use crate::consistency::Verdict;
+use crate::filter::AxisDesign;
+use crate::model::LinearModel;
+use crate::montecarlo::Outcome;
+use crate::params::Params;
+use crate::replay::ReplayResult;
+use crate::tune::{AxisReport, Tuned};
+use crate::units::{Quantity, Unit};
+
+/// Everything that is shown.
+pub(super) struct View<'a> {
+    pub(super) name: &'a str,
+    pub(super) params: &'a Params,
+    pub(super) tuned: &'a Tuned,
+    pub(super) verification: &'a Outcome,
+}
+
+/// One or more axes with the same design.
+pub(super) struct Group<'a> {
+    pub(super) names: Vec<&'a str>,
+    pub(super) design: &'a AxisDesign,
+    pub(super) report: &'a AxisReport,
+    pub(super) unit: Unit,
+}
+
+impl View<'_> {
+    /// Axes of the same numbers together, in order.
+    pub(super) fn groups(&self) -> Vec<Group<'_>> {
+        let mut groups: Vec<Group<'_>> = Vec::new();
+        let axes = self.tuned.design.axes.iter().zip(&self.tuned.reports).zip(&self.params.axes);
+        for ((design, report), params) in axes {
+            let unit = params.display_unit(self.params.quantity);
+            let same = |g: &&mut Group<'_>| {
+                g.unit == unit
+                    && g.design.model == design.model
+                    && g.report.warnings == report.warnings
+                    && g.report.predicted == report.predicted
+            };
+            match groups.iter_mut().find(same) {
+                Some(group) => group.names.push(&design.name),
+                None => groups.push(Group { names: vec![&design.name], design, report, unit }),
+            }
+        }
+        groups
+    }
+}
+
+impl Group<'_> {
+    pub(super) fn title(&self) -> String {
+        match self.names.as_slice() {
+            [one] => format!("axis {one}"),
+            many => format!("axes {} (identical)", many.join(", ")),
+        }
+    }
+}
+
+/// A state's own unit: that of the quantity is shown in the unit of the axis, others in SI.
+pub(super) fn shown(model: &LinearModel, state: usize, quantity: Quantity, unit: &Unit) -> (f64, String) {
+    let si = &model.states[state].unit;
+    if si == quantity.si_unit() { (unit.scale(), unit.to_string()) } else { (1.0, si.clone()) }
+}
+
+pub(super) const STATES: [&str; 6] =
+    ["state", "unit", "sigma of P0", "sigma of Q per step", "steady sigma", "steady gain"];
+pub(super) const BUDGET: [&str; 3] = ["source", "sigma", "share of variance"];
+
+/// The whole printed text.
+pub(super) fn design(view: &View<'_>) -> String {
+    let params = view.params;
+    let mut out = format!(
+        "{}: plant {}, {} Hz, measurement z = sum of the states + white noise\n",
+        view.name, view.tuned.design.plant, params.sample_rate_hz
+    );
+    for group in view.groups() {
+        let unit = &group.unit;
+        out.push_str(&format!("\n{}\n{}", group.title(), table(&STATES, &state_rows(&group, params.quantity))));
+        out.push('\n');
+        for (label, value) in facts(&group) {
+            out.push_str(&format!("{label:<26}{value}\n"));
+        }
+        out.push('\n');
+        if group.report.error_budget.is_empty() {
+            out.push_str(
+                "Error budget: the error of the drift estimate tends to zero; there is nothing to share out.\n",
+            );
+        } else {
+            out.push_str(&format!(
+                "Error budget of the drift estimate in steady state (sigma in {unit})\n{}",
+                table(&BUDGET, &budget_rows(&group))
+            ));
+        }
+        let header = sigma_header(&group);
+        let header: Vec<&str> = header.iter().map(String::as_str).collect();
+        out.push_str(&format!(
+            "\nPredicted sigma of the estimation errors\n{}",
+            table(&header, &sigma_rows(&group, params.quantity))
+        ));
+        out.push('\n');
+        for sentence in &group.report.observability {
+            out.push_str(&format!("{sentence}\n"));
+        }
+        for warning in &group.report.warnings {
+            out.push_str(&format!("note: {warning}\n"));
+        }
+    }
+    out.push_str(&verification(view.verification, params.sample_rate_hz));
+    out
+}
+
+pub(super) fn state_rows(group: &Group<'_>, quantity: Quantity) -> Vec<Vec<String>> {
+    let (model, steady) = (&group.design.model, &group.design.steady_state);
+    let p = &steady.predicted_covariance;
+    (0..model.states.len())
+        .map(|i| {
+            let (scale, unit) = shown(model, i, quantity, &group.unit);
+            let sigma = |variance: f64| digits(variance.max(0.0).sqrt() / scale);
+            // after the update: P(k|k) = (I − K H) P(k|k−1)
+            let updated = p[(i, i)] - (steady.gain.row(i) * &model.h * p.column(i))[(0, 0)];
+            let vanishes = p[(i, i)] == 0.0;
+            vec![
+                model.states[i].name.clone(),
+                unit,
+                sigma(model.p0[(i, i)]),
+                sigma(model.q[(i, i)]),
+                if vanishes { "tends to 0".into() } else { sigma(updated) },
+                digits(steady.gain[(i, 0)] * group.unit.scale() / scale),
+            ]
+        })
+        .collect()
+}
+
+/// Label and value of what is said in one line each.
+pub(super) fn facts(group: &Group<'_>) -> Vec<(&'static str, String)> {
+    let (model, steady, report) = (&group.design.model, &group.design.steady_state, group.report);
+    let unit = &group.unit;
+    let root_r = unit.from_si(model.r[(0, 0)].sqrt());
+    vec![
+        ("R", format!("{} ({unit})^2: one sample has sigma {} {unit}", digits(root_r * root_r), digits(root_r))),
+        ("closed-loop poles", poles_text(&steady.poles, model.dt)),
+        (
+            "settling time",
+            if steady.settling_time > 0.0 {
+                format!("{} s (four time constants of the slowest driven pole)", digits(steady.settling_time))
+            } else {
+                "never: the estimate gets better for ever".into()
+            },
+        ),
+        (
+            "drift estimate settled",
+            report.drift_settling_time_s.map_or_else(
+                || "later than the table below reaches".into(),
+                |t| format!("{} s (sigma within 5 % of its final value)", digits(t)),
+            ),
+        ),
+        (
+            "bandwidth",
+            report.bandwidth_hz.map_or_else(
+                || "0: the filter follows no drift".into(),
+                |f| format!("{} Hz (half power of the drift estimate)", digits(f)),
+            ),
+        ),
+        (
+            "Riccati equation",
+            format!(
+                "relative residual {:.1e}, difference to the eigenvector solution {:.1e}",
+                steady.residual, steady.eigenvector_difference
+            ),
+        ),
+    ]
+}
+
+fn pole_text((re, im): (f64, f64), dt: f64) -> String {
+    let modulus = re.hypot(im);
+    let value = if im == 0.0 { format!("{re:.8}") } else { format!("{re:.8}{im:+.8}i") };
+    if modulus >= 1.0 - 1e-12 {
+        format!("{value} (holds for ever)")
+    } else if modulus > 0.0 {
+        format!("{value} (time constant {} s)", digits(-dt / (modulus - 1.0).ln_1p()))
+    } else {
+        value
+    }
+}
+
+/// Every pole, or of many only how far they reach.
+fn poles_text(poles: &[(f64, f64)], dt: f64) -> String {
+    if poles.len() <= 4 {
+        return poles.iter().map(|pole| pole_text(*pole, dt)).collect::<Vec<_>>().join(", ");
+    }
+    let time = |(re, im): &(f64, f64)| -dt / (re.hypot(*im) - 1.0).ln_1p();
+    let decaying: Vec<f64> = poles.iter().filter(|p| p.0.hypot(p.1) < 1.0 - 1e-12).map(time).collect();
+    format!(
+        "{} with time constants from {} s to {} s, {} that hold for ever",
+        decaying.len(),
+        digits(decaying.iter().copied().fold(f64::INFINITY, f64::min)),
+        digits(decaying.iter().copied().fold(0.0, f64::max)),
+        poles.len() - decaying.len()
+    )
+}
+
+pub(super) fn budget_rows(group: &Group<'_>) -> Vec<Vec<String>> {
+    let sigma = |variance: f64| digits(group.unit.from_si(variance.sqrt()));
+    let budget = &group.report.error_budget;
+    let mut rows: Vec<Vec<String>> = budget
+        .iter()
+        .map(|s| vec![s.source.clone(), sigma(s.variance_si), format!("{:.2} %", 100.0 * s.share)])
+        .collect();
+    let total: f64 = budget.iter().map(|s| s.variance_si).sum();
+    rows.push(vec!["all".into(), sigma(total), "100 %".into()]);
+    rows
+}
+
+/// States with a column of their own: not those that only together stand for flicker.
+pub(super) fn told(model: &LinearModel) -> impl Iterator<Item = usize> + '_ {
+    (0..model.states.len()).filter(|&i| !model.states[i].name.starts_with("bias_instability"))
+}
+
+pub(super) fn sigma_header(group: &Group<'_>) -> Vec<String> {
+    let mut header = vec!["time (s)".to_string()];
+    header.extend(told(&group.design.model).map(|i| group.design.model.states[i].name.clone()));
+    header.push(format!("whole drift ({})", group.unit));
+    header
+}
+
+/// About one row per decade.
+pub(super) fn sigma_rows(group: &Group<'_>, quantity: Quantity) -> Vec<Vec<String>> {
+    let predicted = &group.report.predicted;
+    let last = predicted.time_s.len().saturating_sub(1);
+    let mut decade = f64::NEG_INFINITY;
+    let mut rows = Vec::new();
+    for (k, &time) in predicted.time_s.iter().enumerate() {
+        let exponent = if time > 0.0 { (time.log10() + 1e-6).floor() } else { f64::NEG_INFINITY };
+        if k == 0 || k == last || exponent > decade {
+            let mut row = vec![digits(time)];
+            for i in told(&group.design.model) {
+                row.push(digits(predicted.sigma[i][k] / shown(&group.design.model, i, quantity, &group.unit).0));
+            }
+            row.push(digits(group.unit.from_si(predicted.total[k])));
+            rows.push(row);
+        }
+        decade = decade.max(exponent);
+    }
+    rows
+}
+
+pub(super) fn verification_header(outcome: &Outcome) -> Vec<String> {
+    let mut header = vec!["axis".to_string()];
+    if let Some(axis) = outcome.axes.first() {
+        header.extend(axis.epochs.iter().map(|e| format!("NEES at {} s", digits(e.time_s))));
+    }
+    header.extend(["NIS", "least adjusted p", "result"].map(String::from));
+    header
+}
+
+pub(super) fn verification_rows(outcome: &Outcome) -> Vec<Vec<String>> {
+    let row = |axis: &crate::montecarlo::AxisOutcome| {
+        let mine = || outcome.tests.iter().filter(|t| t.axis == axis.name);
+        let least = mine().map(|t| t.adjusted_p_value).fold(1.0, f64::min);
+        let mut row = vec![axis.name.clone()];
+        row.extend(axis.epochs.iter().map(|e| digits(e.anees)));
+        row.extend([digits(axis.nis), digits(least), if mine().all(|t| t.pass) { "pass" } else { "FAIL" }.into()]);
+        row
+    };
+    outcome.axes.iter().map(row).collect()
+}
+
+/// What was run and what it means.
+pub(super) fn verification_sentence(outcome: &Outcome, sample_rate_hz: f64) -> String {
+    let what = format!(
+        "{} runs of {} s on the design's own model (seed {}), {} tests, false alarm at most {} %",
+        outcome.runs,
+        outcome.steps as f64 / sample_rate_hz,
+        outcome.seed,
+        outcome.tests.len(),
+        100.0 * outcome.alpha
+    );
+    match outcome.verdict {
+        Verdict::Consistent => format!("{what}: errors and innovations are as large as the filter says"),
+        _ => {
+            let failed: Vec<String> = outcome
+                .tests
+                .iter()
+                .filter(|t| !t.pass)
+                .map(|t| format!("{} {}: {}", t.axis, t.name, t.meaning))
+                .collect();
+            format!("{what}: {}", failed.join("; "))
+        }
+    }
+}
+
+fn verification(outcome: &Outcome, sample_rate_hz: f64) -> String {
+    let header = verification_header(outcome);
+    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+    format!(
+        "\nQuick Monte Carlo: mean NEES per state and mean NIS, 1 when the filter's covariance is right\n{}{}: {}\n",
+        table(&header, &verification_rows(outcome)),
+        outcome.verdict.word(),
+        verification_sentence(outcome, sample_rate_hz)
+    )
+}
+
+/// The verdict of the log.
+pub(super) fn replay(result: &ReplayResult) -> String {
+    format!(
+        "\n{} through this design: {}: {}\n",
+        result.log.as_deref().unwrap_or("the log"),
+        result.verdict.word(),
+        result.meaning
+    )
+}

@@ -1,0 +1,106 @@
+//! The covariance of a filter over time, by doubling: any number of steps costs its logarithm.
+
+use nalgebra::DMatrix;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::sensor::drift_sigma;
+use crate::model::LinearModel;
+use crate::numerics::linalg::{LinalgError, solve_spd, symmetrise};
+use crate::numerics::riccati::Flow;
+
+/// Points per decade of time.
+const PER_DECADE: i32 = 8;
+/// Shortest span shown, s.
+const SHORTEST_SPAN: f64 = 1000.0;
+/// Longest span in steps: beyond, doubles no longer count steps exactly.
+const MOST_STEPS: f64 = 1e15;
+
+/// Standard deviations of the estimation errors after the update at each time, SI.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Predicted {
+    /// s from the first measurement.
+    pub time_s: Vec<f64>,
+    /// One list per state, in the order of the model.
+    pub sigma: Vec<Vec<f64>>,
+    /// Of the whole drift, the sum that is subtracted from a measurement.
+    pub total: Vec<f64>,
+}
+
+/// Within this share of its final value the drift estimate counts as settled.
+const SETTLED: f64 = 0.05;
+
+/// Time in s after which the predicted sigma of the whole drift stays within 5 % of `final_sigma`; `None` when that is beyond the
+/// times of `predicted`, or when the final sigma is zero.
+pub(super) fn drift_settling_time(
+    model: &LinearModel,
+    predicted: &Predicted,
+    final_sigma: f64,
+) -> Result<Option<f64>, LinalgError> {
+    let outside = |sigma: f64| (sigma / final_sigma - 1.0).abs() > SETTLED;
+    let Some(last) = predicted.total.iter().rposition(|&sigma| outside(sigma)) else {
+        return Ok(Some(0.0).filter(|_| final_sigma > 0.0));
+    };
+    let Some(inside) = predicted.time_s.get(last + 1) else { return Ok(None) };
+    let steps = |time: f64| (time / model.dt).round() as u64;
+    let (mut low, mut high) = (steps(predicted.time_s[last]), steps(*inside));
+    while high - low > 1 {
+        let middle = low + (high - low) / 2;
+        let p = covariances(model, &[middle])?;
+        if p.iter().any(|p| outside(drift_sigma(model, p))) { low = middle } else { high = middle }
+    }
+    Ok(Some(high as f64 * model.dt))
+}
+
+/// P(k|k) at these numbers of steps after the first measurement.
+pub(super) fn covariances(model: &LinearModel, steps: &[u64]) -> Result<Vec<DMatrix<f64>>, LinalgError> {
+    let mut powers = vec![Flow::one_step(&model.f, &model.h, &model.q, &model.r)?];
+    let mut result = Vec::with_capacity(steps.len());
+    for &count in steps {
+        let mut p = model.p0.clone();
+        for bit in 0..u64::BITS - count.leading_zeros() {
+            while powers.len() <= bit as usize {
+                let mut next = powers[powers.len() - 1].clone();
+                next.double()?;
+                powers.push(next);
+            }
+            if count >> bit & 1 == 1 {
+                p = powers[bit as usize].apply(&p)?;
+            }
+        }
+        result.push(updated(model, &p)?);
+    }
+    Ok(result)
+}
+
+/// P(k|k) from P(k|k−1), Joseph form.
+fn updated(model: &LinearModel, p: &DMatrix<f64>) -> Result<DMatrix<f64>, LinalgError> {
+    let h = &model.h;
+    let s = h * p * h.transpose() + &model.r;
+    let gain = solve_spd(&s, &(h * p))?.transpose();
+    let keep = DMatrix::identity(p.nrows(), p.nrows()) - &gain * h;
+    let mut next = &keep * p * keep.transpose() + &gain * &model.r * gain.transpose();
+    symmetrise(&mut next);
+    Ok(next)
+}
+
+/// Predicted standard deviations at log-spaced times: the first measurement, then eight per decade to ten settling times or more.
+pub fn predicted_sigma(model: &LinearModel, settling_time_s: f64) -> Result<Predicted, LinalgError> {
+    let span = (10.0 * settling_time_s).max(SHORTEST_SPAN).max(100.0 * model.dt);
+    let most = (span / model.dt).min(MOST_STEPS);
+    let mut steps = vec![0u64];
+    for k in 0.. {
+        let count = 10f64.powf(f64::from(k) / f64::from(PER_DECADE)).round();
+        if count > most * 1.001 {
+            break;
+        }
+        if steps.last().is_some_and(|last| (*last as f64) < count) {
+            steps.push(count as u64);
+        }
+    }
+    let covariances = covariances(model, &steps)?;
+    let n = model.states.len();
+    let sigma = (0..n).map(|i| covariances.iter().map(|p| p[(i, i)].max(0.0).sqrt()).collect()).collect();
+    let total = covariances.iter().map(|p| drift_sigma(model, p)).collect();
+    Ok(Predicted { time_s: steps.iter().map(|&s| s as f64 * model.dt).collect(), sigma, total })
+}

@@ -7,8 +7,13 @@ use crate::report::figure::{self, Allan, AllanPoint, Curve};
 
 /// All axes, one above the other.
 pub(super) fn sheet(log: &str, title: &str, axes: &[AxisCurve]) -> String {
-    let figures: Vec<String> = axes.iter().map(|axis| figure::allan(&data(axis, title))).collect();
+    let figures: Vec<String> = axes.iter().map(|axis| figure(axis, title)).collect();
     figure::sheet(&format!("{log}: {title}"), &figures)
+}
+
+/// One axis.
+pub(super) fn figure(axis: &AxisCurve, title: &str) -> String {
+    figure::allan(&data(axis, title))
 }
 
 fn data(axis: &AxisCurve, title: &str) -> Allan {

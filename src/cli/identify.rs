@@ -1,12 +1,399 @@
 //! `kfdesign identify`.
 
+mod sight;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::bail;
+use clap::ValueEnum;
+use rayon::prelude::*;
+use serde::Serialize;
+
 use super::Status;
+use super::allan::AxisCurve;
+use super::log_flags::{LogFlags, print_check};
+use super::output::{digits, print_json, print_text, progress, table};
+use super::stretch::{Stretch, stretches};
+use crate::export::atomic;
+use crate::identify::graphical::Step;
+use crate::identify::{Candidate, Identified, Method, ModelChoice, identify_axis, parse_model};
+use crate::params::{Measured, NotIdentified, Params, Source, TermEntry};
+use crate::signal::LogCheck;
+use crate::units::{Quantity, Unit};
 
 /// Noise parameters from a log at rest, with intervals
+///
+/// What the log cannot tell is listed under not_identified with the reason and, where it can be said, the log length that
+/// would tell; it is never filled in with a number.
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+#[command(
+    after_help = "Example: kfdesign identify static.csv --unit deg/s --rate 100 -o params.json --report identify.html"
+)]
+pub struct Args {
+    /// The log, sensor at rest: text, .gz or .npy
+    log: PathBuf,
+    /// The parameters: params.json
+    #[arg(short, long, value_name = "FILE.json")]
+    output: Option<PathBuf>,
+    /// How parameters are taken from the log
+    #[arg(long, value_enum, default_value_t = MethodArg::Allan)]
+    method: MethodArg,
+    /// Terms of the model: auto, or white+gm, white+rrw … (terms: white, gm (up to three), rrw, flicker, quantization, ramp)
+    #[arg(long, value_name = "MODEL", default_value = "auto")]
+    model: String,
+    /// One HTML page with tables and figures
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
+    /// Allan curve of every axis with the fitted components
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// One JSON document on stdout
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    reading: LogFlags,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum MethodArg {
+    /// The seed paper's reading of the Allan plot, each step with what it costs
+    Graphical,
+    /// Weighted fit of the whole Allan curve, terms chosen by score
+    Allan,
+}
+
+impl MethodArg {
+    fn method(self) -> Method {
+        match self {
+            MethodArg::Graphical => Method::Graphical,
+            MethodArg::Allan => Method::Allan,
+        }
+    }
+}
+
+/// What `identify --json` prints.
+#[derive(Debug, Serialize)]
+struct Document<'a> {
+    /// "kfdesign-identify/1".
+    format: &'static str,
+    /// As written with `-o`.
+    params: &'a Params,
+    axes: Vec<AxisDocument<'a>>,
+    log: &'a LogCheck,
+}
+
+/// How the parameters of one axis came about.
+#[derive(Debug, Serialize)]
+struct AxisDocument<'a> {
+    name: &'a str,
+    /// Samples used: the longest stretch without gaps and unusable samples.
+    samples: usize,
+    left_out: usize,
+    /// Averaging times the fit used, s.
+    first_tau_s: f64,
+    /// Absent for the graphical recipe.
+    fit_p_value: Option<f64>,
+    candidates: &'a [Candidate],
+    steps: &'a [Step],
+    warnings: &'a [String],
+    allan: CurveDocument,
+}
+
+/// The measured curve and the model's; in `unit`.
+#[derive(Debug, Serialize)]
+struct CurveDocument {
+    unit: String,
+    tau_s: Vec<f64>,
+    deviation: Vec<f64>,
+    lower: Vec<f64>,
+    upper: Vec<f64>,
+    edf: Vec<f64>,
+    model: Vec<f64>,
+}
+
+/// One axis as read and as identified.
+struct Axis {
+    measured: AxisCurve,
+    found: Identified,
+}
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
-    let _ = args;
-    todo!()
+    let choice = parse_model(&args.model)?;
+    if args.method == MethodArg::Graphical && choice != ModelChoice::Auto {
+        bail!(
+            "--model {}: the graphical recipe has one model (white noise and one Gauss-Markov process); leave --model out",
+            args.model
+        );
+    }
+    for output in [&args.output, &args.report, &args.plot].into_iter().flatten() {
+        atomic::refuse_input_as_output(output, &args.log)?;
+    }
+    let options = args.reading.options()?;
+    let (recording, check) = crate::input::read(&args.log, &options)?;
+    print_check(&recording.name, &check);
+    let dt = recording.dt();
+    let parts = stretches(&recording, options.kind);
+    if parts.is_empty() {
+        bail!("{}: no axis to work on", args.log.display());
+    }
+    let bar = progress(parts.len() as u64, "identify");
+    let axes: Vec<Axis> = parts
+        .into_par_iter()
+        .map(|part| {
+            let axis = identify(part, dt, args.method.method(), &choice, &check);
+            bar.inc(1);
+            axis
+        })
+        .collect::<anyhow::Result<_>>()?;
+    bar.finish_and_clear();
+    for Axis { measured: AxisCurve { stretch, .. }, .. } in axes.iter().filter(|a| a.measured.stretch.left_out > 0) {
+        eprintln!(
+            "  note: {}: the longest stretch without gaps and unusable samples is used: {} samples, {} left out",
+            stretch.name,
+            stretch.rate.len(),
+            stretch.left_out
+        );
+    }
+    let params = Params {
+        quantity: recording.quantity,
+        sample_rate_hz: recording.sample_rate_hz,
+        axes: axes.iter().map(|a| a.found.params.clone()).collect(),
+        source: Some(Source {
+            log: Some(file_name(&args.log)),
+            sha256: recording.sha256.clone(),
+            samples: Some(check.samples),
+            span_s: Some(check.span_s),
+            method: Some(args.method.method().name().into()),
+            version: Some(env!("CARGO_PKG_VERSION").into()),
+            note: None,
+        }),
+    };
+    if let Some(path) = &args.output {
+        atomic::write(path, params.to_json().as_bytes())?;
+    }
+    if let Some(path) = &args.plot {
+        atomic::write(path, sight::sheet(&recording.name, &axes).as_bytes())?;
+    }
+    if let Some(path) = &args.report {
+        atomic::write(path, sight::page(&params, &axes)?.as_bytes())?;
+    }
+    if args.json {
+        print_json(&document(&params, &axes, &check))?;
+    } else {
+        let text: Vec<String> = axes.iter().map(|axis| text(axis, params.quantity)).collect();
+        print_text(&text.join("\n"))?;
+    }
+    Ok(Status::Done)
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+}
+
+fn identify(part: Stretch, dt: f64, method: Method, choice: &ModelChoice, check: &LogCheck) -> anyhow::Result<Axis> {
+    let mut found = identify_axis(&part.name, &part.rate, dt, &part.unit, method, choice)?;
+    let moves = |axis: &Option<String>| axis.as_ref().is_none_or(|name| *name == part.name);
+    if check.findings.iter().any(|f| f.kind == "motion" && moves(&f.axis)) {
+        found.warnings.push(
+            "the log is not at rest all the time (see the log check): motion counts as drift here; cut it with --start/--end"
+                .into(),
+        );
+    }
+    let measured = AxisCurve { stretch: part, curve: found.curve.clone(), fit: Ok(found.model.clone()) };
+    Ok(Axis { measured, found })
+}
+
+fn document<'a>(params: &'a Params, axes: &'a [Axis], log: &'a LogCheck) -> Document<'a> {
+    let axis = |axis: &'a Axis| {
+        let Axis { measured, found } = axis;
+        let points = &found.curve.points;
+        let unit = &measured.stretch.unit;
+        CurveDocument {
+            unit: unit.text().into(),
+            tau_s: points.iter().map(|p| p.tau_s).collect(),
+            deviation: points.iter().map(|p| unit.from_si(p.deviation)).collect(),
+            lower: points.iter().map(|p| unit.from_si(p.lower)).collect(),
+            upper: points.iter().map(|p| unit.from_si(p.upper)).collect(),
+            edf: points.iter().map(|p| p.edf).collect(),
+            model: points
+                .iter()
+                .map(|p| unit.from_si(found.model.allan_variance(p.m, found.curve.dt).sqrt()))
+                .collect(),
+        }
+    };
+    let axes = axes.iter().map(|a| AxisDocument {
+        name: &a.found.params.name,
+        samples: a.measured.stretch.rate.len(),
+        left_out: a.measured.stretch.left_out,
+        first_tau_s: a.found.first_tau_s,
+        fit_p_value: a.found.fit_p_value.is_finite().then_some(a.found.fit_p_value),
+        candidates: &a.found.candidates,
+        steps: &a.found.steps,
+        warnings: &a.found.warnings,
+        allan: axis(a),
+    });
+    Document { format: "kfdesign-identify/1", params, axes: axes.collect(), log }
+}
+
+const PARAMETERS: [&str; 6] = ["parameter", "value", "95 % from", "to", "unit", "also"];
+const CANDIDATES: [&str; 6] = ["model", "parameters", "chi-square", "dof", "score", ""];
+const STEPS: [&str; 4] = ["step", "formula", "value", "unit"];
+/// Candidates shown; all are in the JSON document.
+const SHOWN_CANDIDATES: usize = 6;
+
+/// Everything a person wants to see of one axis.
+fn text(axis: &Axis, quantity: Quantity) -> String {
+    let mut out = format!("{}\n{}", headline(axis), table(&PARAMETERS, &parameter_rows(axis, quantity)));
+    if !axis.found.candidates.is_empty() {
+        out += &format!("\n{CANDIDATES_CAPTION}:\n{}", table(&CANDIDATES, &candidate_rows(&axis.found.candidates)));
+    }
+    if !axis.found.steps.is_empty() {
+        out += &format!("\nThe recipe, step by step:\n{}", table(&STEPS, &step_rows(&axis.found.steps)));
+        out += "What each step costs:\n";
+        for sentence in costs(&axis.found.steps) {
+            out += &format!("  {sentence}\n");
+        }
+    }
+    if !axis.found.not_identified.is_empty() {
+        out += "\nNot identified:\n";
+        for sentence in axis.found.not_identified.iter().map(not_identified) {
+            out += &format!("  {sentence}\n");
+        }
+    }
+    for warning in &axis.found.warnings {
+        out += &format!("warning: {warning}\n");
+    }
+    out
+}
+
+const CANDIDATES_CAPTION: &str = "Candidates (score = chi-square + 4 per parameter + 4 per process; lowest wins)";
+
+/// "gyro_x: white+gm, 720000 samples in 2 h".
+fn headline(axis: &Axis) -> String {
+    let Axis { measured, found } = axis;
+    let samples = measured.stretch.rate.len();
+    let span = duration(samples as f64 * found.curve.dt);
+    match found.candidates.iter().find(|c| c.chosen) {
+        Some(chosen) => format!(
+            "{}: {} from {samples} samples ({span}); fit p = {}, averaging times from {} s",
+            found.params.name,
+            chosen.model,
+            digits(found.fit_p_value),
+            digits(found.first_tau_s)
+        ),
+        None => format!("{}: the graphical recipe on {samples} samples ({span})", found.params.name),
+    }
+}
+
+/// Seconds below two minutes, minutes below two hours, else hours.
+fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 120.0 => format!("{} s", digits(s)),
+        s if s < 7200.0 => format!("{} min", digits(s / 60.0)),
+        s => format!("{} h", digits(s / 3600.0)),
+    }
+}
+
+fn parameter_rows(axis: &Axis, quantity: Quantity) -> Vec<Vec<String>> {
+    let row = |name: &str, value: &Measured, also: String| {
+        let [lower, upper] = value.interval.map_or(["-".into(), "-".into()], |i| i.map(digits));
+        vec![name.to_string(), digits(value.value), lower, upper, value.unit.to_string(), also]
+    };
+    let params = &axis.found.params;
+    let mut rows: Vec<Vec<String>> =
+        params.bias.iter().map(|b| row("bias (mean of this log)", b, String::new())).collect();
+    for term in &params.terms {
+        match term {
+            TermEntry::Quantization { coefficient } => rows.push(row("quantization Q", coefficient, String::new())),
+            TermEntry::White { density } => rows.push(row("white N", density, random_walk_name(density, quantity))),
+            TermEntry::BiasInstability { coefficient } => {
+                rows.push(row("flicker B (bias instability)", coefficient, floor_name(coefficient, quantity)));
+            }
+            TermEntry::GaussMarkov { std_dev, correlation_time } => {
+                rows.push(row("Gauss-Markov sigma", std_dev, driving_name(std_dev, correlation_time)));
+                rows.push(row("Gauss-Markov Tc", correlation_time, String::new()));
+            }
+            TermEntry::RateRandomWalk { density } => {
+                rows.push(row("rate random walk K", density, walk_name(density, quantity)));
+            }
+            TermEntry::RateRamp { slope } => rows.push(row("rate ramp R", slope, String::new())),
+        }
+    }
+    rows
+}
+
+/// A value in another unit: "3.372 deg/sqrt(h)".
+fn in_unit(si: f64, unit: &str) -> Option<String> {
+    Unit::parse(unit).ok().map(|unit| format!("{} {unit}", digits(unit.from_si(si))))
+}
+
+/// The integral of white noise as datasheets call it.
+fn random_walk_name(density: &Measured, quantity: Quantity) -> String {
+    let (name, unit) = match quantity {
+        Quantity::AngularRate => ("angle random walk", "deg/sqrt(h)"),
+        Quantity::SpecificForce => ("velocity random walk", "m/s/sqrt(h)"),
+    };
+    in_unit(density.si(), unit).map_or_else(String::new, |value| format!("{name} {value}"))
+}
+
+fn floor_name(coefficient: &Measured, quantity: Quantity) -> String {
+    let unit = match quantity {
+        Quantity::AngularRate => "deg/h",
+        Quantity::SpecificForce => "mg",
+    };
+    let floor = (2.0 * std::f64::consts::LN_2 / std::f64::consts::PI).sqrt() * coefficient.si();
+    in_unit(floor, unit).map_or_else(String::new, |value| format!("Allan floor 0.6643 B = {value}"))
+}
+
+/// The driving noise of a Gauss-Markov process: the random walk it is at short times.
+fn driving_name(std_dev: &Measured, correlation_time: &Measured) -> String {
+    let unit = std_dev.unit.times_time(-1);
+    let driving = std_dev.si() * (2.0 / correlation_time.si()).sqrt();
+    format!("driving noise {} {unit}", digits(unit.from_si(driving)))
+}
+
+fn walk_name(density: &Measured, quantity: Quantity) -> String {
+    let unit = match quantity {
+        Quantity::AngularRate => "deg/h/sqrt(h)",
+        Quantity::SpecificForce => "mg/sqrt(h)",
+    };
+    in_unit(density.si(), unit).unwrap_or_default()
+}
+
+fn candidate_rows(candidates: &[Candidate]) -> Vec<Vec<String>> {
+    let shown = |(place, c): &(usize, &Candidate)| *place < SHOWN_CANDIDATES || c.chosen;
+    let row = |(_, c): (usize, &Candidate)| {
+        let mark = match (c.chosen, c.identified) {
+            (true, _) => "chosen",
+            (false, false) => "not identified",
+            (false, true) => "",
+        };
+        vec![
+            c.model.clone(),
+            c.parameters.to_string(),
+            digits(c.chi_square),
+            c.dof.to_string(),
+            digits(c.score),
+            mark.to_string(),
+        ]
+    };
+    candidates.iter().enumerate().filter(shown).map(row).collect()
+}
+
+fn step_rows(steps: &[Step]) -> Vec<Vec<String>> {
+    let row = |s: &Step| {
+        let value = s.value.map_or("-".to_string(), digits);
+        vec![s.what.clone(), s.formula.clone(), value, s.unit.clone()]
+    };
+    steps.iter().map(row).collect()
+}
+
+fn costs(steps: &[Step]) -> Vec<String> {
+    steps.iter().map(|s| format!("{}: {}", s.what, s.cost)).collect()
+}
+
+fn not_identified(entry: &NotIdentified) -> String {
+    let needed =
+        entry.needed_log_s.map_or_else(String::new, |s| format!("; a log of about {} would tell", duration(s)));
+    format!("{}: {}{needed}", entry.term, entry.reason)
 }

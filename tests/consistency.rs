@@ -121,6 +121,17 @@ fn ljung_box_and_largest_lag() {
     assert!(result.interval[0] < result.max_abs_autocorrelation && result.max_abs_autocorrelation < result.interval[1]);
 }
 
+fn autoregressive(phi: f64, run: u64) -> Vec<f64> {
+    let mut x = 0.0;
+    white(run, 4000)
+        .iter()
+        .map(|e| {
+            x = phi * x + e;
+            x
+        })
+        .collect()
+}
+
 /// Missing samples keep their place: products and pairs equal a loop over all pairs of present samples.
 #[test]
 fn autocorrelation_over_missing_samples() {
@@ -317,14 +328,11 @@ fn interval_of_the_largest_autocorrelation_covers() {
     let phi = 0.5_f64;
     let (mut covered, mut share) = (0, 0.0);
     for run in 0..400 {
-        let mut sums = Autocorrelation::new(20);
-        let mut x = 0.0;
-        for e in white(50_000 + run, 4000) {
-            x = phi * x + e;
-            sums.push(x);
-        }
-        let result = sums.whiteness(0.05);
+        let result = accumulate(20, &autoregressive(phi, 50_000 + run)).whiteness(0.05);
         covered += u32::from(result.interval[0] <= phi && phi <= result.interval[1]);
+        // Šidák's quantile for 20 lags: scipy 1.17.1, norm.ppf(1 − (1 − 0.95**(1/20))/2)
+        let half_width = (result.interval[1] - result.interval[0]) / 2.0;
+        assert_relative_eq!(half_width, 3.015994533489952 / 3999.0_f64.sqrt(), max_relative = 1e-9);
         let effect = result.tests("x", 1.0, 0.05)[1].effect.clone().unwrap();
         share += effect.value / 400.0;
         assert!(effect.is_beyond());
@@ -332,4 +340,18 @@ fn interval_of_the_largest_autocorrelation_covers() {
     assert!(f64::from(covered) >= 400.0 * 0.95 - 4.9 * (400.0 * 0.95 * 0.05_f64).sqrt(), "covered {covered}");
     // mean of 400 values whose spread is about 0.04: 0.333 ± 0.01 is five standard errors
     assert!((share - 1.0 / 3.0).abs() < 0.01, "{share}");
+}
+
+/// AR(1) with φ = 0.1: the interval of the predictable share, Σρ² = φ²/(1 − φ²), covers it in 95 % of 400 runs (± 4.9 standard deviations, 1e-6).
+#[test]
+fn interval_of_the_predictable_share_covers() {
+    let phi = 0.1_f64;
+    let truth = phi * phi / (1.0 - phi * phi);
+    let covered = (0..400).filter(|run| {
+        let result = accumulate(20, &autoregressive(phi, 60_000 + run)).whiteness(0.05);
+        let effect = result.tests("x", 1.0, 0.05)[1].effect.clone().unwrap();
+        effect.interval[0] <= truth && truth <= effect.interval[1]
+    });
+    let coverage = covered.count() as f64 / 400.0;
+    assert!((coverage - 0.95).abs() < 4.9 * (0.05 * 0.95 / 400.0_f64).sqrt(), "{coverage}");
 }

@@ -96,12 +96,13 @@ fn replay(design: &FilterDesign, z: &[f64], options: Options) -> ReplayResult {
 fn oracle_log() -> (FilterDesign, Vec<f64>, Vec<u64>) {
     let phi = (-0.1_f64 / 5.0).exp();
     let q = 0.02 * 0.02 * (1.0 - phi * phi);
-    let small = design(vec![axis("x", 0.1, q, phi, 0.05 * 0.05 / 0.1, [0.1, 0.0], [0.04, 0.0004])]);
+    let small = design(vec![axis("x", 0.1, q, phi, 0.05 * 0.05 / 0.1, [0.1, 0.03], [0.04, 0.0009])]);
     let mut z: Vec<f64> =
         (0..40).map(f64::from).map(|k| 0.15 + 0.05 * (0.7 * k).sin() + 0.1 * (1.3 * k * k).sin()).collect();
     z[7] = f64::NAN;
     z[15] = 3.0;
     let mut missing = vec![0; 40];
+    missing[0] = 2; // before the first sample: nothing to predict
     missing[20] = 5;
     missing[30] = 1000;
     (small, z, missing)
@@ -110,7 +111,16 @@ fn oracle_log() -> (FilterDesign, Vec<f64>, Vec<u64>) {
 /// One row of the oracle: sample, ν, √S, x(k|k), √diag P(k|k).
 type Row = (usize, f64, f64, [f64; 2], [f64; 2]);
 
-fn check(rows: &[Row], gate: Option<f64>, log_likelihood: f64, nis: f64, accepted: u64, rejected: u64) {
+fn check(
+    rows: &[Row],
+    gate: Option<f64>,
+    log_likelihood: f64,
+    nis: f64,
+    accepted: u64,
+    rejected: u64,
+    start: f64,
+    start_p: f64,
+) {
     let (small, z, missing) = oracle_log();
     let mut replayer = Replayer::new(&small, &shape(&["x"], 10.0), Options { gate, ..Options::default() }).unwrap();
     let (mut first, mut second) = (Estimates::default(), Estimates::default());
@@ -136,78 +146,81 @@ fn check(rows: &[Row], gate: Option<f64>, log_likelihood: f64, nis: f64, accepte
     assert_relative_eq!(axis.nis.unwrap().mean, nis, max_relative = 1e-12);
     assert_eq!((axis.samples, axis.unusable, axis.gaps, axis.missing), (40, 1, 2, 1005));
     assert_eq!((axis.accepted, axis.rejected), (accepted, rejected));
+    assert_relative_eq!(axis.start.unwrap().sigmas, start, max_relative = 1e-9);
+    assert_relative_eq!(axis.start.unwrap().p_value, start_p, max_relative = 1e-8);
 }
 
 /// An independent filter in numpy 2.4.6 (Joseph form, a loop of predictions over gaps); statsmodels 0.15.0 (MLEModel.ssm.filter(),
-/// known initial state, NaN rows in the gaps) gives the same log-likelihood, −127.81424368821102, and the same last innovation.
+/// known initial state, NaN rows in the gaps) gives the same log-likelihood, −127.37343447181166, and the same last innovation.
+/// The start statistic: the innovations regressed on the answer of the same filter to a shift of x0 by one sigma of P0.
 #[test]
 fn equals_independent_filters() {
     let rows = [
         (
             0,
-            0.05,
-            0.25573423705088844,
-            [0.13058103975535168, 0.00030581039755351675],
-            [0.12464015482868535, 0.019938744113398212],
+            0.01999999999999999,
+            0.2567099530598687,
+            [0.11213960546282245, 0.030273141122913506],
+            [0.12538257085558216, 0.029794439908628796],
         ),
         (
             1,
-            0.1476859082022868,
-            0.20112983301084714,
-            [0.1864211022413575, 0.0008760146398666422],
-            [0.09875215868041898, 0.019925700568869678],
+            0.13675340467527342,
+            0.20129193756563302,
+            [0.16339144384839227, 0.030798003452717205],
+            [0.10014839131626671, 0.029425271286281723],
         ),
         (
             6,
-            -0.04290723044813993,
-            0.16974478971805207,
-            [0.17477184838805476, 0.0007036896822680636],
-            [0.059984248088103265, 0.01991739961757846],
+            -0.04365657042879892,
+            0.16974566479586226,
+            [0.14855405982438766, 0.02757125632408058],
+            [0.0629461234360132, 0.027911981671453947],
         ),
         (
             8,
-            0.04285248327694763,
-            0.16833235839938013,
-            [0.17971478515593511, 0.0007778981269472723],
-            [0.056754732072192324, 0.019919748867862328],
+            0.043256197555439996,
+            0.1683326148384203,
+            [0.1535521077747723, 0.026584504099500327],
+            [0.05986577204318711, 0.027382457963872286],
         ),
         (
             16,
-            -0.2632127246121009,
-            0.16333845274682568,
-            [0.32016108773816604, 0.0067930258393583045],
-            [0.04280071286992647, 0.019910900730764156],
+            -0.26058069738791356,
+            0.16335410270581147,
+            [0.29862816731272446, 0.025812819018588274],
+            [0.04649100891571344, 0.025564228579897822],
         ),
         (
             20,
-            -0.18915053364966083,
-            0.16256774935356294,
-            [0.2754572872896774, 0.0032217526017759303],
-            [0.03917197144393591, 0.01991278821616088],
+            -0.1837577708876102,
+            0.16262509671112052,
+            [0.2530646658865467, 0.020390480965000204],
+            [0.04290523989146196, 0.024013452011034307],
         ),
         (
             29,
-            -0.04666612132041634,
-            0.16130241808523504,
-            [0.24728043467341798, -0.0002273269484265882],
-            [0.033848918614717824, 0.019841727813012074],
+            -0.04018293527439035,
+            0.16136981150173094,
+            [0.2251715621800833, 0.015619895180911563],
+            [0.0373608708590923, 0.022851297950421113],
         ),
         (
             30,
-            0.04160805427714895,
-            0.16292866319421118,
-            [0.24907629276576865, 0.0006269637181123412],
-            [0.033110379823793515, 0.01984874478854163],
+            0.06371692673846685,
+            0.16369433304025027,
+            [0.22849067115844587, 0.0009511467657635428],
+            [0.03637476568078112, 0.019850161781017395],
         ),
         (
             39,
-            -0.125193921277725,
-            0.16129711107541117,
-            [0.2244869279511329, -0.007339766952020056],
-            [0.02862247426534485, 0.019143525789543803],
+            -0.10905331133220271,
+            0.16160571678446375,
+            [0.20625502805524573, -0.0050175292809219755],
+            [0.030653215215504386, 0.019194464889809595],
         ),
     ];
-    check(&rows, None, -127.81424368821105, 8.291595017921994, 39, 0);
+    check(&rows, None, -127.37343447181163, 8.266943182534062, 39, 0, 0.6521246420989274, 0.5194147020160792);
 }
 
 /// The same oracle with a gate of five sigmas: sample 15 is counted and changes nothing.
@@ -216,34 +229,34 @@ fn gated_sample_changes_nothing() {
     let rows = [
         (
             16,
-            -0.07367508210734461,
-            0.16370170779727275,
-            [0.14922636561642222, -0.00018469923308896618],
-            [0.04390632560266144, 0.01991491179730485],
+            -0.07035244065893095,
+            0.16371929339207292,
+            [0.12381226392553481, 0.022115622369451405],
+            [0.04755531121709753, 0.0255651042084344],
         ),
         (
             20,
-            -0.04036403108210905,
-            0.16278731900383944,
-            [0.1385394442360453, -0.0007089148209138449],
-            [0.03993353966926089, 0.019914034888698307],
+            -0.03419131150666048,
+            0.16284659868052523,
+            [0.11375555308249767, 0.01822811281215239],
+            [0.04362517077448921, 0.02401376452711676],
         ),
         (
             30,
-            0.13510612543622916,
-            0.16301445114802185,
-            [0.15974974918270857, 0.00203368093976842],
-            [0.03349433750769539, 0.01984890455150628],
+            0.1564364832175248,
+            0.16377833970714395,
+            [0.14075309643895625, 0.0023328408534325517],
+            [0.03671262319848868, 0.019850316033743345],
         ),
         (
             39,
-            -0.06457226891872088,
-            0.16133341738713036,
-            [0.1576996567586444, 0.0011670763418657251],
-            [0.028869419746558125, 0.019149540808763823],
+            -0.052313444055642824,
+            0.1616375721828741,
+            [0.1439900793768056, 0.002913295728521529],
+            [0.03085459051512706, 0.019199698732776493],
         ),
     ];
-    check(&rows, Some(5.0), 28.36537624435248, 0.2418779996880318, 38, 1);
+    check(&rows, Some(5.0), 28.218364669142225, 0.24752897547788963, 38, 1, 0.18703552059811326, 0.8534535355074933);
 }
 
 /// The reference sensor ("skydog") and mistuned copies; P0 of the bias from 0.5 deg/s.
@@ -463,5 +476,102 @@ fn wrong_logs_and_options_are_refused() {
     }
     for gate in [0.5, -3.0, f64::NAN, f64::INFINITY] {
         assert!(refuse(&fits, Options { gate: Some(gate), ..Options::default() }).starts_with("gate is"));
+    }
+}
+
+/// The log of the small oracle as text, three decimals would not do: shortest exact numbers.
+fn log_text(z: &[f64], dt: f64) -> String {
+    let mut text = String::from("t (s),x (rad/s)\n");
+    for (k, value) in z.iter().enumerate() {
+        text.push_str(&format!("{},{value}\n", k as f64 * dt));
+    }
+    text
+}
+
+/// The command on a right and on a wrong design: exit status, the document's keys, the estimates file, page and figures.
+#[test]
+fn command_end_to_end() {
+    let bench = crate::support::Bench::new();
+    let right = skydog(0.1, 1.0, 1.0, 1.0);
+    let log = draw(&right, 5, 12_000);
+    bench.file("filter.json", right.to_json());
+    bench.file("wrong.json", skydog(0.1, 1.2, 1.0, 1.0).to_json());
+    bench.file("log.csv", log_text(&log, 0.1));
+
+    let text = bench.ok("replay filter.json log.csv -o est.csv --innovations --report page.html --plot figures.svg");
+    assert!(text.contains("\nconsistent: "), "{text}");
+    let estimates = bench.read("est.csv");
+    let header = "time (s),x_bias (rad/s),x_bias_sigma (rad/s),x_drift (rad/s),x_drift_sigma (rad/s),\
+                  x_innovation (rad/s),x_innovation_sigma (rad/s),x_nis";
+    assert_eq!(estimates.lines().next(), Some(header));
+    assert_eq!(estimates.lines().count(), 12_001);
+    let page = bench.read("page.html");
+    assert!(page.contains("consistent") && page.contains("<svg") && !page.contains("<script"));
+    assert!(bench.read("figures.svg").starts_with("<svg"));
+
+    let document: serde_json::Value = serde_json::from_str(&bench.ok("replay filter.json log.csv --json")).unwrap();
+    assert_eq!(document["format"], "kfdesign-replay/1");
+    assert_eq!(document["verdict"], "consistent");
+    let axis = &document["axes"][0];
+    assert_eq!(
+        (&axis["name"], &axis["samples"], &axis["gaps"], &axis["rejected"]),
+        (&"x".into(), &12_000.into(), &0.into(), &0.into())
+    );
+    for (object, keys) in [
+        (&axis["nis"], &["mean", "lower", "upper"][..]),
+        (&axis["whiteness"], &["max_abs_autocorrelation", "lag", "interval", "ljung_box"]),
+        (
+            &document["tests"][0],
+            &["axis", "name", "statistic", "lower", "upper", "p_value", "adjusted_p_value", "pass", "meaning"],
+        ),
+    ] {
+        for key in keys {
+            assert!(!object[key].is_null(), "{key} in {object}");
+        }
+    }
+    // the file's innovations give the document's log-likelihood and mean NIS: one record, one truth
+    let rows = estimates.lines().skip(1).map(|l| l.split(',').map(|c| c.parse::<f64>().unwrap()).collect::<Vec<_>>());
+    let (mut log_likelihood, mut nis) = (0.0, 0.0);
+    for row in rows {
+        log_likelihood -= 0.5 * ((std::f64::consts::TAU * row[6] * row[6]).ln() + row[7]);
+        nis += row[7] / 12_000.0;
+    }
+    assert_relative_eq!(axis["log_likelihood"].as_f64().unwrap(), log_likelihood, max_relative = 1e-11);
+    assert_relative_eq!(axis["nis"]["mean"].as_f64().unwrap(), nis, max_relative = 1e-11);
+
+    let failed = bench.run("replay wrong.json log.csv --json");
+    assert_eq!(failed.status, 1, "{}", failed.stderr);
+    assert!(failed.stdout.contains("\"verdict\": \"inconsistent\""));
+    let short = bench.run("replay filter.json log.csv --end 60");
+    assert_eq!(short.status, 0);
+    assert!(short.stdout.contains("\ninconclusive: x: "), "{}", short.stdout);
+}
+
+/// What cannot be done: one line, exit 2, and no file left behind.
+#[test]
+fn command_refuses() {
+    let bench = crate::support::Bench::new();
+    let right = skydog(0.1, 1.0, 1.0, 1.0);
+    bench.file("filter.json", right.to_json());
+    bench.file("log.csv", log_text(&draw(&right, 5, 200), 0.1));
+    bench.file("fast.csv", log_text(&draw(&right, 5, 200), 0.01));
+    let before = bench.files();
+    let cases = [
+        ("replay filter.json fast.csv -o e.csv", "the filter is for 10 Hz"),
+        ("replay filter.json log.csv --alpha 0", "alpha is 0"),
+        ("replay filter.json log.csv --gate 0.1", "gate is 0.1"),
+        ("replay filter.json log.csv -o log.csv", "it is the input file"),
+        ("replay filter.json log.csv --report filter.json", "it is the input file"),
+        ("replay filter.json log.csv -o e.txt", "extension"),
+        ("replay filter.json log.csv -o e.csv --plot nowhere/f.svg", "cannot write"),
+        ("replay filter.json log.csv --innovations", "--output"),
+        ("replay missing.json log.csv", "missing.json"),
+        ("replay filter.json missing.csv", "missing.csv"),
+    ];
+    for (command, message) in cases {
+        let out = bench.run(command);
+        assert_eq!(out.status, 2, "{command}: {}", out.stderr);
+        assert!(out.stderr.contains(message), "{command}: {}", out.stderr);
+        assert_eq!(bench.files(), before, "{command}");
     }
 }

@@ -367,3 +367,21 @@ impl CumulativePeriodogram {
             ))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::bartlett_variance;
+
+    /// AR(1): n·var(r_h) = (1 + φ²)(1 − φ^2h)/(1 − φ²) − 2hφ^2h (Brockwell & Davis 1991, example 7.2.3); white noise: 1.
+    #[test]
+    fn bartlett_variance_of_an_autoregression() {
+        let phi = 0.5_f64;
+        let r: Vec<f64> = (1..=80).map(|h| phi.powi(h)).collect();
+        for h in [1, 2, 5, 20] {
+            let decay = phi.powi(2 * h);
+            let expected = (1.0 + phi * phi) * (1.0 - decay) / (1.0 - phi * phi) - 2.0 * f64::from(h) * decay;
+            assert!((bartlett_variance(&r, h as usize - 1) - expected).abs() < 1e-9, "lag {h}");
+        }
+        assert!((bartlett_variance(&[0.0; 10], 3) - 1.0).abs() < 1e-15);
+    }
+}

@@ -24,6 +24,20 @@ pub enum Deviation {
     Totdev,
 }
 
+impl Deviation {
+    /// In words, for tables and figures.
+    pub fn name(self) -> &'static str {
+        match self {
+            Deviation::Adev => "Allan deviation",
+            Deviation::Oadev => "overlapping Allan deviation",
+            Deviation::Mdev => "modified Allan deviation",
+            Deviation::Hdev => "Hadamard deviation",
+            Deviation::Ohdev => "overlapping Hadamard deviation",
+            Deviation::Totdev => "total deviation",
+        }
+    }
+}
+
 /// Tau grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TauGrid {
@@ -44,6 +58,20 @@ pub enum NoiseType {
     RandomWalk,
     Ramp,
     Unknown,
+}
+
+impl NoiseType {
+    /// In words; a dash where too few averages are left to tell.
+    pub fn name(self) -> &'static str {
+        match self {
+            NoiseType::Quantization => "quantization",
+            NoiseType::White => "white",
+            NoiseType::Flicker => "flicker",
+            NoiseType::RandomWalk => "random walk",
+            NoiseType::Ramp => "ramp",
+            NoiseType::Unknown => "-",
+        }
+    }
 }
 
 /// One averaging time. Deviations are SI.

@@ -70,16 +70,6 @@ impl DeviationArg {
             DeviationArg::Totdev => Deviation::Totdev,
         }
     }
-    fn title(self) -> &'static str {
-        match self {
-            DeviationArg::Adev => "Allan deviation",
-            DeviationArg::Oadev => "Overlapping Allan deviation",
-            DeviationArg::Mdev => "Modified Allan deviation",
-            DeviationArg::Hdev => "Hadamard deviation",
-            DeviationArg::Ohdev => "Overlapping Hadamard deviation",
-            DeviationArg::Totdev => "Total deviation",
-        }
-    }
 }
 
 fn parse_grid(text: &str) -> Result<TauGrid, String> {
@@ -188,7 +178,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         atomic::write(path, text.as_bytes())?;
     }
     if let Some(path) = &args.plot {
-        atomic::write(path, allan_figure::sheet(&recording.name, args.deviation.title(), &axes).as_bytes())?;
+        atomic::write(path, allan_figure::sheet(&recording.name, &axes).as_bytes())?;
     }
     if args.json {
         print_json(&document)?;
@@ -230,7 +220,7 @@ fn notes(axis: &AxisCurve) {
 }
 
 /// "white + gauss_markov".
-pub(super) fn model_name(model: &NoiseModel) -> String {
+fn model_name(model: &NoiseModel) -> String {
     let names: Vec<String> = model
         .terms
         .iter()
@@ -284,7 +274,7 @@ fn text(axis: &AxisCurve, deviation: DeviationArg) -> String {
                 digits(unit.from_si(p.upper)),
                 digits(p.edf),
                 p.terms.to_string(),
-                noise_name(p.noise).into(),
+                p.noise.name().into(),
             ]
         })
         .collect();
@@ -303,20 +293,8 @@ fn text(axis: &AxisCurve, deviation: DeviationArg) -> String {
     format!(
         "{}: {} of {} samples\n{}{lowest}Intervals: {basis}.\n",
         axis.stretch.name,
-        deviation.title().to_lowercase().replace("allan", "Allan").replace("hadamard", "Hadamard"),
+        deviation.kind().name(),
         axis.curve.samples,
         table(&header, &rows),
     )
-}
-
-/// In words; a dash where too few averages are left to tell.
-pub(super) fn noise_name(noise: NoiseType) -> &'static str {
-    match noise {
-        NoiseType::Quantization => "quantization",
-        NoiseType::White => "white",
-        NoiseType::Flicker => "flicker",
-        NoiseType::RandomWalk => "random walk",
-        NoiseType::Ramp => "ramp",
-        NoiseType::Unknown => "-",
-    }
 }

@@ -59,11 +59,44 @@ pub enum Block {
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Table {
     pub caption: String,
-    /// With units; the first column is text, the others are numbers, right aligned.
+    /// With units.
     pub header: Vec<String>,
     pub rows: Vec<Vec<String>>,
-    /// Columns of sentences: left aligned and wrapped.
-    pub words: Vec<usize>,
+    /// How each column is set.
+    pub columns: Vec<Column>,
+}
+
+/// How a column is set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Column {
+    /// Right aligned.
+    Number,
+    /// Left aligned.
+    Word,
+    /// Left aligned and wrapped.
+    Sentence,
+}
+
+impl Column {
+    /// A column of numbers has one, or nothing, in every cell.
+    fn of<'a>(cells: impl Iterator<Item = &'a str> + Clone) -> Column {
+        let number = |cell: &str| {
+            let start = cell.trim_start_matches(['-', '−', '<', '>', '≤', '≥', '±', ' ']);
+            let words = ["above ", "below ", "NaN", "inf", "–"];
+            cell.is_empty()
+                || start.starts_with(|c: char| c.is_ascii_digit())
+                || words.iter().any(|w| cell.starts_with(w))
+                || cell == "-"
+        };
+        if cells.clone().any(|cell| cell.chars().count() > 32) {
+            Column::Sentence
+        } else if cells.clone().all(number) && cells.clone().any(|cell| !cell.is_empty()) {
+            Column::Number
+        } else {
+            Column::Word
+        }
+    }
 }
 
 #[derive(Clone, Debug, Default, Serialize)]
@@ -115,9 +148,9 @@ impl Section {
     #[must_use]
     pub fn table(mut self, caption: impl Into<String>, header: &[&str], rows: Vec<Vec<String>>) -> Section {
         let header: Vec<String> = header.iter().map(|h| (*h).to_owned()).collect();
-        let long = |column: &usize| rows.iter().filter_map(|r| r.get(*column)).any(|cell| cell.chars().count() > 32);
-        let words = (1..header.len()).filter(long).collect();
-        self.blocks.push(Block::Table(Table { caption: caption.into(), header, rows, words }));
+        let cells = |i: usize| rows.iter().filter_map(move |row| row.get(i)).map(String::as_str);
+        let columns = (0..header.len()).map(|i| Column::of(cells(i))).collect();
+        self.blocks.push(Block::Table(Table { caption: caption.into(), header, rows, columns }));
         self
     }
     /// Figures with captions, side by side where there is room.

@@ -10,12 +10,10 @@ use crate::report::figure;
 use crate::report::page::{Page, PageError, Section};
 use crate::units::digits;
 
-const TITLE: &str = "Overlapping Allan deviation";
-
 /// All axes, one above the other.
 pub(super) fn sheet(log: &str, axes: &[Axis]) -> String {
-    let figures: Vec<String> = axes.iter().map(|axis| allan_figure::figure(&axis.measured, TITLE)).collect();
-    figure::sheet(&format!("{log}: {TITLE}"), &figures)
+    let figures: Vec<String> = axes.iter().map(|axis| allan_figure::figure(&axis.measured)).collect();
+    figure::sheet(&format!("{log}: overlapping Allan deviation"), &figures)
 }
 
 /// The report page as HTML.
@@ -52,7 +50,7 @@ fn section(axis: &Axis, params: &Params) -> Section {
         section = section.warning(warning.clone());
     }
     section = section.figures(vec![(
-        allan_figure::figure(&axis.measured, TITLE),
+        allan_figure::figure(&axis.measured),
         "The measured curve with exact 95 % intervals for the model, and the model's terms.".to_string(),
     )]);
     if !found.not_identified.is_empty() {

@@ -1,6 +1,7 @@
 //! Log files to [`Recording`] (floor 2): recognise the format, choose columns, units and rate, read in one or two streaming passes.
 
 mod columns;
+mod names;
 mod npy;
 mod sniff;
 mod text;
@@ -11,7 +12,8 @@ use std::path::Path;
 
 use sha2::{Digest, Sha256};
 
-use self::columns::{Choice, Head};
+use self::columns::Choice;
+use self::names::Head;
 use crate::signal::check::{AxisRange, BackwardStamp, Checker, Outcome, TimeBase};
 use crate::signal::{Axis, Gap, LogCheck, Recording};
 use crate::units::{Quantity, Unit};
@@ -87,7 +89,7 @@ impl Rows {
 
 /// A file of columns, read from the beginning as often as needed.
 trait Table {
-    fn heads(&self) -> &[Head];
+    fn heads(&self) -> Vec<&Head>;
     /// False when the columns have only numbers.
     fn named(&self) -> bool;
     /// File and place of the names, for messages.
@@ -95,6 +97,8 @@ trait Table {
     fn row_place(&self, line: u64) -> String;
     fn select(&mut self, time: Option<usize>, axes: &[usize]);
     fn rewind(&mut self) -> Result<(), InputError>;
+    /// Number of rows, where the file says it.
+    fn rows(&self) -> Option<u64>;
     /// The first stamp of the file, in the file's unit.
     fn origin(&self) -> f64;
     /// Up to [`BLOCK`] further rows; false at the end.
@@ -183,7 +187,7 @@ impl Log {
         }
         let mut table = open_table(path)?;
         let (named, place) = (table.named(), table.place());
-        let choice = columns::Table { heads: table.heads(), named, place: &place }.choose(options)?;
+        let choice = columns::Table { heads: &table.heads(), named, place: &place }.choose(options)?;
         table.select(choice.time.as_ref().map(|(column, _)| *column), &choice.columns);
         Ok(Log { table, choice, options: options.clone() })
     }
@@ -203,14 +207,15 @@ impl Log {
             if self.stamped()
                 && let Some(empty) = rows.time.iter().position(|t| !t.is_finite())
             {
-                let head = &self.table.heads()[*column];
-                let place = columns::Table { heads: self.table.heads(), named: self.table.named(), place: "" };
+                let heads = self.table.heads();
+                let head = heads[*column];
+                let table = columns::Table { heads: &heads, named: self.table.named(), place: "" };
                 return Err(InputError {
                     message: format!(
                         "{}, column '{}': the time stamp is empty; choose another with --time{}, or give --rate HZ",
                         self.table.row_place(rows.lines[empty]),
                         head.full,
-                        place.other_times(*column)
+                        table.other_times(*column)
                     ),
                 });
             }
@@ -387,6 +392,9 @@ impl LogReader {
 pub fn read(path: &Path, options: &LogOptions) -> Result<(Recording, LogCheck), InputError> {
     let mut log = Log::open(path, options)?;
     let mut values: Vec<Vec<f64>> = vec![Vec::new(); log.choice.axes.len()];
+    if let (Some(rows), None, None) = (log.table.rows(), options.start_s, options.end_s) {
+        values.iter_mut().for_each(|column| column.reserve_exact(rows as usize)); // the file is as long as it says
+    }
     let scan = log.scan(|rows, wanted| {
         for (kept, column) in values.iter_mut().zip(&rows.values) {
             kept.extend_from_slice(&column[wanted.clone()]);

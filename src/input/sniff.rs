@@ -1,6 +1,6 @@
 //! What a text log looks like: delimiter, decimal sign, header, first row of numbers; found from the beginning of the file.
 
-use super::columns::Head;
+use super::names::Head;
 
 /// How the fields of a line are separated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

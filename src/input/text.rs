@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use flate2::bufread::MultiGzDecoder;
 
-use super::columns::Head;
+use super::names::Head;
 use super::sniff::{self, Layout};
 use super::{BLOCK, InputError, Rows, Table};
 
@@ -157,8 +157,11 @@ impl TextTable {
 }
 
 impl Table for TextTable {
-    fn heads(&self) -> &[Head] {
-        &self.layout.heads
+    fn heads(&self) -> Vec<&Head> {
+        self.layout.heads.iter().collect()
+    }
+    fn rows(&self) -> Option<u64> {
+        None
     }
     fn named(&self) -> bool {
         self.layout.named
@@ -241,7 +244,7 @@ fn not_text(bytes: &[u8]) -> Option<String> {
         (b"PAR1", "a Parquet file"),
         (b"PK\x03\x04", "a zip archive (npz, xlsx?)"),
         (b"\x28\xb5\x2f\xfd", "compressed with zstd"),
-        (b"\x93NUMPY", "a NumPy array in a file not named .npy"),
+        (b"\x93NUMPY", "a NumPy array, compressed or not named .npy"),
     ];
     let what = match KNOWN.iter().find(|(magic, _)| bytes.starts_with(magic)) {
         Some((_, what)) => what,

@@ -2,9 +2,10 @@
 //! motion, outliers; each with count and place. Works in one streaming pass with bounded memory.
 //!
 //! The rules are stated where they are applied: for time in `stamps`, for one axis in `axis`, for whole rows here:
-//! - *Zero row*: every axis exactly 0, more often than the zeros of the single axes would make it (less than 1 in 10⁶).
-//! - *Repeated row*: every axis equal to the row before, in more than 1 % of the rows and over 5 times as often as the single
-//!   axes' repeats would make it: the sensor is slower than the log.
+//! - *Zero row*: every axis exactly 0, more often than the zeros of the single axes in the other rows would make it by chance
+//!   (less than 1 in 10⁶).
+//! - *Repeated row*: every axis equal to the row before, by the same rule, in more than 1 % of the rows: the sensor is slower
+//!   than the log.
 //!
 //! Nothing is repaired. NaN stays NaN, a gap stays a gap with its number of missing samples, everything else is kept.
 
@@ -240,11 +241,13 @@ impl Checker {
         if self.axes.len() < 2 {
             return notes; // one axis cannot be told from its own values
         }
+        // rows by chance, from how often each axis does it in the other rows
+        let by_chance = |count: u64, on_axis: &dyn Fn(&AxisCheck) -> u64| {
+            let others = (rows - count as f64).max(1.0);
+            others * self.axes.iter().map(|axis| (on_axis(axis) - count) as f64 / others).product::<f64>()
+        };
         if let Count { count, first: Some(first) } = self.zero_rows {
-            let others = rows - count as f64;
-            let by_chance: f64 =
-                others * self.axes.iter().map(|a| (a.zeros - count) as f64 / others.max(1.0)).product::<f64>();
-            if unlikely(count as f64, by_chance) {
+            if unlikely(count as f64, by_chance(count, &|axis| axis.zeros)) {
                 notes.push(Note {
                     kind: "zero-row",
                     count,
@@ -255,8 +258,7 @@ impl Checker {
             }
         }
         if let Count { count, first: Some(first) } = self.repeated_rows {
-            let by_chance: f64 = rows * self.axes.iter().map(|a| a.repeats as f64 / rows).product::<f64>();
-            if count as f64 > 0.01 * rows && count as f64 > 5.0 * by_chance {
+            if count as f64 > 0.01 * rows && unlikely(count as f64, by_chance(count, &|axis| axis.repeats)) {
                 notes.push(Note {
                     kind: "repeated-row",
                     count,

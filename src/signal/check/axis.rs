@@ -399,8 +399,8 @@ fn quantisation_step(sample: &mut [f64]) -> Option<f64> {
     // closer values differ by the arithmetic that made them, not by the sensor
     let same = 1e-6 * if spread > 0.0 { spread } else { range };
     let gaps: Vec<f64> = sample.windows(2).map(|w| w[1] - w[0]).filter(|gap| *gap > same).collect();
-    if gaps.len() < 3 || gaps.len() * 2 > sample.len() {
-        return None; // too few levels to tell, or hardly any value twice
+    if gaps.is_empty() || gaps.len() * 2 > sample.len() {
+        return None; // hardly any value occurs twice
     }
     let smallest = gaps.iter().copied().fold(f64::INFINITY, f64::min);
     let (mut total, mut steps, mut fits) = (0.0, 0.0, 0);

@@ -1,1 +1,108 @@
+use super::*;
+use crate::numerics::random::{StreamId, fill_normal, stream};
 
+const DEG: f64 = std::f64::consts::PI / 180.0;
+
+fn noise(n: usize, sigma: f64, axis: u32) -> Vec<f64> {
+    let mut rng = stream(7, StreamId { run: 0, axis, term: 0 });
+    let mut x = vec![0.0; n];
+    fill_normal(&mut rng, &mut x);
+    x.iter_mut().for_each(|v| *v *= sigma);
+    x
+}
+
+fn check(values: &[f64], kind: InputKind) -> Vec<Note> {
+    let unit = Unit::parse(if kind == InputKind::Rate { "deg/s" } else { "deg" }).unwrap();
+    let mut axis = AxisCheck::new("x", &unit, Quantity::AngularRate, kind);
+    for (i, x) in values.iter().enumerate() {
+        axis.add(*x, Place { index: i as u64, time_s: f64::NAN });
+    }
+    axis.findings(100.0)
+}
+
+fn kinds(values: &[f64]) -> Vec<&'static str> {
+    check(values, InputKind::Rate).iter().map(|f| f.kind).collect()
+}
+
+fn only(values: &[f64], kind: &str) -> (u64, u64, bool) {
+    let found = check(values, InputKind::Rate);
+    let note = found.iter().find(|f| f.kind == kind).unwrap_or_else(|| panic!("no {kind} among {}", found.len()));
+    (note.count, note.first.map_or(0, |p| p.index), note.serious)
+}
+
+// A window's threshold of 8 robust sigma: below 1e-14 per sample, so below 1e-8 for all samples of these tests; the other
+// rules are further away still.
+#[test]
+fn white_noise_with_a_slow_drift_has_nothing_to_say() {
+    let mut x = noise(100_000, 0.1 * DEG, 0);
+    x.iter_mut().enumerate().for_each(|(i, v)| *v += 0.2 * DEG * (i as f64 / 3e4).sin());
+    assert!(kinds(&x).is_empty(), "{:?}", kinds(&x));
+}
+
+#[test]
+fn each_defect_is_found_once_with_count_and_place() {
+    let rest = noise(20_000, 0.1 * DEG, 1);
+    let with = |change: &dyn Fn(&mut Vec<f64>)| {
+        let mut x = rest.clone();
+        change(&mut x);
+        x
+    };
+    let nan = with(&|x| (500..510).for_each(|i| x[i] = f64::NAN));
+    assert_eq!((kinds(&nan), only(&nan, "nan")), (vec!["nan"], (10, 500, false)));
+    let stuck = with(&|x| (700..720).for_each(|i| x[i] = x[699]));
+    assert_eq!((kinds(&stuck), only(&stuck, "stuck")), (vec!["stuck"], (21, 699, true)));
+    let outlier = with(&|x| (0..3).for_each(|i| x[5000 + 2000 * i] += 2.0 * DEG));
+    assert_eq!((kinds(&outlier), only(&outlier, "outlier")), (vec!["outlier"], (3, 5000, true)));
+    let limited = with(&|x| x.iter_mut().for_each(|v| *v = v.min(0.22 * DEG)));
+    let above = rest.iter().filter(|v| **v >= 0.22 * DEG).count() as u64;
+    let first = rest.iter().position(|v| *v >= 0.22 * DEG).unwrap() as u64;
+    assert_eq!(only(&limited, "saturated"), (above, first, true));
+    let lowest = with(&|x| x.iter_mut().for_each(|v| *v = v.max(-0.22 * DEG)));
+    assert!(kinds(&lowest).contains(&"saturated"));
+    let moved = with(&|x| (8000..9000).for_each(|i| x[i] += 5.0 * DEG * ((i as f64) / 20.0).sin()));
+    let (_, first, serious) = only(&moved, "motion");
+    assert!(serious && first.abs_diff(8000) < 64, "{first}");
+    let turning = with(&|x| x.iter_mut().for_each(|v| *v += 40.0 * DEG));
+    assert_eq!((kinds(&turning), only(&turning, "motion")), (vec!["motion"], (20_000, 0, true)));
+    let swaying = with(&|x| x.iter_mut().enumerate().for_each(|(i, v)| *v += 4.0 * DEG * (i as f64 / 3e3).sin()));
+    assert_eq!(only(&swaying, "motion"), (20_000, 0, true));
+}
+
+#[test]
+fn the_quantisation_step_is_measured_also_through_printing() {
+    let step = DEG / 131.0;
+    let coarse: Vec<f64> = noise(20_000, 0.1 * DEG, 2).iter().map(|x| (x / step).round() * step).collect();
+    // printed with six decimals of a degree, with an offset that is no multiple
+    let printed: Vec<f64> = coarse.iter().map(|x| ((x / DEG + 0.0023) * 1e6).round() / 1e6 * DEG).collect();
+    for x in [&coarse, &printed] {
+        let mut sample = x.clone();
+        let found = quantisation_step(&mut sample).unwrap();
+        assert!((found / step - 1.0).abs() < 1e-3, "{found}");
+        assert_eq!((kinds(x), only(x, "quantised")), (vec!["quantised"], (20_000, 0, false)));
+    }
+    // the noise is below the steps
+    let hidden: Vec<f64> = noise(20_000, 0.1 * DEG, 3).iter().map(|x| (x / (0.3 * DEG)).round() * 0.3 * DEG).collect();
+    assert!(only(&hidden, "quantised").2);
+    assert!(quantisation_step(&mut noise(20_000, 1.0, 4)).is_none());
+}
+
+#[test]
+fn increments_and_integrals_are_judged_as_the_rate_they_make() {
+    let rate = noise(20_000, 0.1 * DEG, 5);
+    let increments: Vec<f64> = rate.iter().map(|r| r * 0.01).collect();
+    let mut angle = Vec::new();
+    increments.iter().fold(0.0, |sum, d| {
+        angle.push(sum + d);
+        sum + d
+    });
+    assert!(check(&increments, InputKind::Increments).is_empty());
+    assert!(check(&angle, InputKind::Angle).is_empty());
+    let turning: Vec<f64> = angle.iter().enumerate().map(|(i, a)| a + 30.0 * DEG * i as f64 * 0.01).collect();
+    let found = check(&turning, InputKind::Angle);
+    assert_eq!(found.iter().map(|f| f.kind).collect::<Vec<_>>(), ["motion"]);
+    assert!(
+        found[0].message.contains("the mean is 30 deg/s") || found[0].message.contains("29.99 deg/s"),
+        "{}",
+        found[0].message
+    );
+}

@@ -1,1 +1,224 @@
-//! Tests of bad_input.
+//! Bad input: each with one clear line on stderr, exit status 2, and nothing left half-written.
+//!
+//! One table per kind of file; a row is what is wrong, the command, and words that the line must contain.
+
+use super::support::Bench;
+
+/// What is wrong, the file's name and bytes, the command's arguments, words of the message.
+type Row<'a> = (&'a str, &'a str, Vec<u8>, &'a str, &'a [&'a str]);
+
+/// Runs each row in a directory of its own that holds only the file; every file made there would be a leftover.
+fn assert_refused(rows: Vec<Row>) {
+    for (what, name, bytes, command, words) in rows {
+        let bench = Bench::new();
+        if !name.is_empty() {
+            bench.file(name, bytes);
+        }
+        let before = bench.files();
+        let out = bench.run(command);
+        let context = format!("{what}: kfdesign {command}\nstdout: {}\nstderr: {}", out.stdout, out.stderr);
+        assert_eq!(out.status, 2, "{context}");
+        assert_eq!(out.stdout, "", "{context}");
+        let errors: Vec<&str> = out.stderr.lines().filter(|line| line.starts_with("kfdesign: ")).collect();
+        assert_eq!((errors.len(), out.stderr.lines().count()), (1, 1), "{context}");
+        for word in words {
+            assert!(errors[0].contains(word), "'{word}' is missing\n{context}");
+        }
+        assert_eq!(bench.files(), before, "{context}");
+    }
+}
+
+/// Twenty good rows under this header, with one row replaced or added.
+fn log(header: &str, at: usize, row: &str) -> Vec<u8> {
+    let mut lines: Vec<String> =
+        (0..20).map(|i| format!("{:.2},{},{}", 0.01 * f64::from(i), i * 7 % 5, i * 3 % 7)).collect();
+    if at < lines.len() {
+        lines[at] = row.to_string();
+    }
+    format!("{header}\n{}\n", lines.join("\n")).into_bytes()
+}
+
+fn npy(header: &str, data: &[u8]) -> Vec<u8> {
+    let mut bytes = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+    bytes.extend(format!("{header:<117}\n").as_bytes());
+    bytes.extend(data);
+    bytes
+}
+
+#[test]
+fn a_log_that_cannot_be_read() {
+    const HEADER: &str = "t_s,gyro_x (deg/s),gyro_y (deg/s)";
+    const GOOD: usize = usize::MAX;
+    let npy_flags = "allan log.npy --columns 1 --unit deg/s --rate 100 -o out.json";
+    let shape = "{'descr': '<f8', 'fortran_order': False, 'shape': (40, 2), }";
+    let constant: String = (0..20).map(|i| format!("{i},0.5,{}\n", i % 3)).collect();
+    let empty: String = (0..20).map(|i| format!("{i},,{}\n", i % 3)).collect();
+    let run = "allan log.csv -o out.json --plot out.svg";
+    assert_refused(vec![
+        ("missing file", "", vec![], run, &["log.csv: there is no such file"]),
+        ("a folder", "x.csv", vec![], "allan . -o out.json", &[".: this is a folder"]),
+        ("empty file", "log.csv", vec![], run, &["log.csv: the file is empty"]),
+        ("header only", "log.csv", format!("{HEADER}\n").into_bytes(), run, &["log.csv: line 1", "no row of numbers"]),
+        ("comments only", "log.csv", b"# nothing\n# here\n".to_vec(), run, &["log.csv: no data"]),
+        ("prose", "log.csv", b"It was a dark\nand stormy night.\n".to_vec(), run, &["log.csv: no rows of numbers"]),
+        (
+            "text in a number column",
+            "log.csv",
+            log(HEADER, 4, "0.04,abc,1"),
+            run,
+            &["log.csv: line 6, column 'gyro_x (deg/s)': 'abc' is not a number"],
+        ),
+        ("short row", "log.csv", log(HEADER, 4, "0.04,1"), run, &["log.csv: line 6: 2 fields where 3 are expected"]),
+        ("long row", "log.csv", log(HEADER, 4, "0.04,1,2,3"), run, &["log.csv: line 6: 4 fields where 3 are expected"]),
+        (
+            "missing column",
+            "log.csv",
+            log(HEADER, GOOD, ""),
+            "allan log.csv --columns gyro_x,gyro_z",
+            &["log.csv: line 1: no column 'gyro_z'", "1 't_s', 2 'gyro_x (deg/s)', 3 'gyro_y (deg/s)'"],
+        ),
+        (
+            "no unit",
+            "log.csv",
+            log("t_s,gyro_x,gyro_y", GOOD, ""),
+            run,
+            &["log.csv: line 1", "'gyro_x'", "--unit deg/s"],
+        ),
+        (
+            "wrong unit",
+            "log.csv",
+            log("t_s,gyro_x (deg),gyro_y (deg)", GOOD, ""),
+            run,
+            &["log.csv: line 1: column 'gyro_x (deg)'", "an angle", "expected an angular rate"],
+        ),
+        (
+            "wrong unit by flag",
+            "log.csv",
+            log("t_s,gyro_x,gyro_y", GOOD, ""),
+            "allan log.csv --unit deg",
+            &["log.csv: line 1: column 'gyro_x'", "an angle", "expected an angular rate"],
+        ),
+        (
+            "unit that is none",
+            "log.csv",
+            log(HEADER, GOOD, ""),
+            "allan log.csv --unit parsec/s",
+            &["--unit", "parsec/s"],
+        ),
+        (
+            "unit against the header",
+            "log.csv",
+            log(HEADER, GOOD, ""),
+            "allan log.csv --unit rad/s",
+            &["log.csv: line 1", "deg/s by its header", "--unit says rad/s"],
+        ),
+        (
+            "no rate",
+            "log.csv",
+            log("n,gyro_x (deg/s),gyro_y (deg/s)", GOOD, ""),
+            run,
+            &["log.csv: line 1: no sample rate", "--rate"],
+        ),
+        (
+            "rate of nothing",
+            "log.csv",
+            log(HEADER, GOOD, ""),
+            "allan log.csv --rate=-5",
+            &["--rate must be a positive number"],
+        ),
+        (
+            "rate of NaN",
+            "log.csv",
+            log(HEADER, GOOD, ""),
+            "allan log.csv --rate NaN",
+            &["--rate must be a positive number"],
+        ),
+        (
+            "time without a unit",
+            "log.csv",
+            log("time,gyro_x (deg/s),gyro_y (deg/s)", GOOD, ""),
+            run,
+            &["log.csv: line 1: time column 'time' has no unit", "--time 'time:s'"],
+        ),
+        (
+            "backward time",
+            "log.csv",
+            log(HEADER, 10, "0.05,1,2"),
+            run,
+            &["log.csv: line 12: time goes back from 0.090000 s to 0.050000 s", "--rate"],
+        ),
+        (
+            "time that stands still",
+            "log.csv",
+            b"t_s,gyro_x (deg/s)\n1,1\n1,2\n1,3\n1,1\n".to_vec(),
+            run,
+            &["log.csv", "do not advance"],
+        ),
+        (
+            "all NaN",
+            "log.csv",
+            format!("{HEADER}\n{empty}").into_bytes(),
+            run,
+            &["log.csv", "'gyro_x' holds no number in 20 rows"],
+        ),
+        (
+            "constant column",
+            "log.csv",
+            format!("{HEADER}\n{constant}").into_bytes(),
+            run,
+            &["log.csv", "'gyro_x' is constant: 0.5 deg/s in all 20"],
+        ),
+        ("one sample", "log.csv", format!("{HEADER}\n0,1,2\n").into_bytes(), run, &["log.csv", "only one sample"]),
+        (
+            "nothing selected",
+            "log.csv",
+            log(HEADER, GOOD, ""),
+            "allan log.csv --start 900",
+            &["log.csv", "--start and --end"],
+        ),
+        (
+            "truncated npy",
+            "log.npy",
+            npy(shape, &[1; 600]),
+            npy_flags,
+            &["log.npy: truncated: 40 rows are declared", "only 37"],
+        ),
+        ("npy header cut", "log.npy", npy(shape, &[])[..50].to_vec(), npy_flags, &["log.npy: truncated"]),
+        (
+            "pickled npy",
+            "log.npy",
+            b"\x80\x04\x95\x16\x00\x00\x00\x00\x00\x00\x00]\x94(K\x01K\x02e.".to_vec(),
+            npy_flags,
+            &["log.npy: this is a Python pickle"],
+        ),
+        (
+            "object dtype",
+            "log.npy",
+            npy("{'descr': '|O', 'fortran_order': False, 'shape': (3,), }", b"\x80\x04]."),
+            npy_flags,
+            &["log.npy: the array holds Python objects"],
+        ),
+        (
+            "huge declared shape",
+            "log.npy",
+            npy("{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000000000, 2), }", &[0; 64]),
+            npy_flags,
+            &["log.npy: truncated: 1000000000000000 rows are declared"],
+        ),
+        (
+            "shape beyond 64 bits",
+            "log.npy",
+            npy("{'descr': '<f8', 'fortran_order': False, 'shape': (99999999999999999999999, 2), }", &[0; 64]),
+            npy_flags,
+            &["log.npy: truncated"],
+        ),
+        ("binary file", "log.csv", vec![0, 1, 2, 3, 0, 255], run, &["log.csv: this is a binary file"]),
+        (
+            "damaged gzip",
+            "log.csv.gz",
+            b"\x1f\x8b\x08\x00garbage".to_vec(),
+            "allan log.csv.gz",
+            &["log.csv.gz: cannot read"],
+        ),
+    ]);
+}

@@ -169,8 +169,8 @@ pub(super) fn layout(sample: &[u8], whole: bool) -> Result<Layout, String> {
     if body.is_empty() {
         return Err("no data: only comments and blank lines".into());
     }
-    // the separator and number of fields that make the most cells into numbers; the first in the list on a tie
-    let mut best: Option<(i64, Delimiter, bool, usize)> = None;
+    // the separator and number of fields that make the most numbers; the first in the list on a tie
+    let mut best: Option<(usize, Delimiter, bool, usize)> = None;
     for (delimiter, decimal_comma) in CANDIDATES {
         for (count, score) in scores(&body, delimiter, decimal_comma) {
             if best.is_none_or(|(most, ..)| score > most) {
@@ -184,22 +184,18 @@ pub(super) fn layout(sample: &[u8], whole: bool) -> Result<Layout, String> {
     describe(&body, &comments, delimiter, decimal_comma, usual)
 }
 
-/// For each number of fields a line has: cells that are numbers, less cells that are other text.
-fn scores(body: &[Line], delimiter: Delimiter, decimal_comma: bool) -> Vec<(usize, i64)> {
-    let mut scores: Vec<(usize, i64)> = Vec::new();
+/// For each number of fields a line has: how many cells of such lines are numbers.
+fn scores(body: &[Line], delimiter: Delimiter, decimal_comma: bool) -> Vec<(usize, usize)> {
+    let mut scores: Vec<(usize, usize)> = Vec::new();
     for line in body {
-        let (mut count, mut score) = (0, 0);
+        let (mut count, mut numbers) = (0, 0);
         for field in fields(line.text, delimiter) {
             count += 1;
-            score += match number(field, decimal_comma) {
-                _ if field.is_empty() => 0,
-                Some(_) => 1,
-                None => -1,
-            };
+            numbers += usize::from(!field.is_empty() && number(field, decimal_comma).is_some());
         }
         match scores.iter_mut().find(|(c, _)| *c == count) {
-            Some((_, total)) => *total += score,
-            None => scores.push((count, score)),
+            Some((_, total)) => *total += numbers,
+            None => scores.push((count, numbers)),
         }
     }
     scores

@@ -178,7 +178,8 @@ pub(super) fn layout(sample: &[u8], whole: bool) -> Result<Layout, String> {
             }
         }
     }
-    let Some((_, delimiter, decimal_comma, usual)) = best else {
+    let Some((_, delimiter, decimal_comma, usual)) = best.filter(|(numbers, ..)| *numbers > 0 || body.len() == 1)
+    else {
         return Err("no rows of numbers found".into());
     };
     describe(&body, &comments, delimiter, decimal_comma, usual)

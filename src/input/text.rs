@@ -48,9 +48,7 @@ fn open(path: &Path) -> Result<Box<dyn BufRead + Send>, InputError> {
     };
     let mut reader = BufReader::with_capacity(1 << 18, file);
     match reader.fill_buf() {
-        Ok(bytes) if bytes.starts_with(&[0x1f, 0x8b]) => {
-            Ok(Box::new(BufReader::with_capacity(1 << 18, MultiGzDecoder::new(reader))))
-        }
+        Ok([0x1f, 0x8b, ..]) => Ok(Box::new(BufReader::with_capacity(1 << 18, MultiGzDecoder::new(reader)))),
         Ok(_) => Ok(Box::new(reader)),
         Err(error) => fail(path, format!("cannot read: {error}")),
     }

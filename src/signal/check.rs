@@ -246,30 +246,31 @@ impl Checker {
             let others = (rows - count as f64).max(1.0);
             others * self.axes.iter().map(|axis| (on_axis(axis) - count) as f64 / others).product::<f64>()
         };
-        if let Count { count, first: Some(first) } = self.zero_rows {
-            if unlikely(count as f64, by_chance(count, &|axis| axis.zeros)) {
-                notes.push(Note {
-                    kind: "zero-row",
-                    count,
-                    first: Some(first),
-                    message: format!("{count} of {} rows are zero on every axis; kept", self.rows),
-                    serious: count > 2 && count as f64 > 1e-3 * rows,
-                });
-            }
+        if let Count { count, first: Some(first) } = self.zero_rows
+            && unlikely(count as f64, by_chance(count, &|axis| axis.zeros))
+        {
+            notes.push(Note {
+                kind: "zero-row",
+                count,
+                first: Some(first),
+                message: format!("{count} of {} rows are zero on every axis; kept", self.rows),
+                serious: count > 2 && count as f64 > 1e-3 * rows,
+            });
         }
-        if let Count { count, first: Some(first) } = self.repeated_rows {
-            if count as f64 > 0.01 * rows && unlikely(count as f64, by_chance(count, &|axis| axis.repeats)) {
-                notes.push(Note {
-                    kind: "repeated-row",
-                    count,
-                    first: Some(first),
-                    message: format!(
-                        "{count} of {} rows repeat the row before on every axis: the sensor is slower than the log; kept",
-                        self.rows
-                    ),
-                    serious: count as f64 > 0.1 * rows,
-                });
-            }
+        if let Count { count, first: Some(first) } = self.repeated_rows
+            && count as f64 > 0.01 * rows
+            && unlikely(count as f64, by_chance(count, &|axis| axis.repeats))
+        {
+            notes.push(Note {
+                kind: "repeated-row",
+                count,
+                first: Some(first),
+                message: format!(
+                    "{count} of {} rows repeat the row before on every axis: the sensor is slower than the log; kept",
+                    self.rows
+                ),
+                serious: count as f64 > 0.1 * rows,
+            });
         }
         notes
     }

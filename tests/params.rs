@@ -217,10 +217,10 @@ fn accepts(schema: &Value, root: &Value, value: &Value) -> Result<(), String> {
     if let Some(reference) = schema.get("$ref").and_then(Value::as_str) {
         return accepts(root.pointer(reference.trim_start_matches('#')).ok_or("dangling reference")?, root, value);
     }
-    if let Some(options) = schema.get("anyOf").and_then(Value::as_array) {
-        if !options.iter().any(|o| accepts(o, root, value).is_ok()) {
-            return Err(format!("{value} matches none of {options:?}"));
-        }
+    if let Some(options) = schema.get("anyOf").and_then(Value::as_array)
+        && !options.iter().any(|o| accepts(o, root, value).is_ok())
+    {
+        return Err(format!("{value} matches none of {options:?}"));
     }
     for (key, rule) in schema.as_object().ok_or("schema is no object")? {
         let fits = match key.as_str() {
@@ -310,5 +310,9 @@ fn the_schema_command_prints_one_document() {
     let bench = Bench::new();
     let printed: Value = serde_json::from_str(&bench.ok("schema params")).unwrap();
     assert_eq!(printed, Params::schema());
+    for (document, key) in [("filter", "plant"), ("replay", "verdict")] {
+        let printed: Value = serde_json::from_str(&bench.ok(&format!("schema {document}"))).unwrap();
+        assert!(printed["properties"].get(key).is_some(), "{printed:#}");
+    }
     assert_eq!(bench.run("schema nonsense").status, 2);
 }

@@ -5,6 +5,7 @@ use clap::ValueEnum;
 use super::{Status, output};
 use crate::filter::FilterDesign;
 use crate::params::Params;
+use crate::replay::ReplayResult;
 
 /// The JSON schema of a document
 #[derive(Debug, clap::Args)]
@@ -21,12 +22,15 @@ enum Document {
     Params,
     /// filter.json: a filter design
     Filter,
+    /// What `replay --json` prints
+    Replay,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     output::print_json(&match args.document {
         Document::Params => Params::schema(),
         Document::Filter => FilterDesign::schema(),
+        Document::Replay => schemars::schema_for!(ReplayResult).to_value(),
     })?;
     Ok(Status::Done)
 }

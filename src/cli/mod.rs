@@ -86,6 +86,9 @@ pub fn main() -> ExitCode {
 
 /// clap's message as one line: what was found and what is expected, without the usage block.
 fn usage_error(error: &clap::Error) -> String {
+    if error.kind() == clap::error::ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        return "no subcommand: kfdesign --help lists them".into();
+    }
     let text = error.render().to_string();
     let message = text.split("\n\n").next().unwrap_or(&text);
     let words: Vec<&str> = message.trim_start_matches("error: ").split_whitespace().collect();

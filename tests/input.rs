@@ -202,6 +202,9 @@ fn columns_by_name_number_and_sensor() {
     // no header: numbers only
     let (log, _) = read("0 5 1\n1 6 3\n2 7 2\n", &[("columns", "3"), ("time", "1:s"), ("unit", "rad/s")]).unwrap();
     assert_eq!((log.axes[0].name.as_str(), shown(&log, 0)), ("column 3", vec![1.0, 3.0, 2.0]));
+    // names without axis words are the axes of one sensor
+    let (log, _) = read("t_s,gyro_north_dps,gyro_east_dps\n0,1,2\n1,2,3\n", &[]).unwrap();
+    assert_eq!(log.axes.iter().map(|a| a.name.as_str()).collect::<Vec<_>>(), ["gyro_north", "gyro_east"]);
     // one column is the column
     let (log, _) = read("0.5\n0.25\n1\n", &[("rate", "10"), ("unit", "1/4 deg/s")]).unwrap();
     assert_close(&log.axes[0].values, &[0.125f64, 0.0625, 0.25].map(f64::to_radians), "one column");

@@ -150,7 +150,9 @@ impl Table<'_> {
         candidates.retain(|c| c.quantity == quantity);
         if candidates.iter().any(|c| c.named) {
             candidates.retain(|c| c.named);
-        } else if candidates.iter().all(|c| !c.axis) {
+        }
+        // gyro_north, gyro_east: without axis words they are the axes of one sensor
+        if candidates.iter().all(|c| !c.axis) {
             candidates.iter_mut().for_each(|c| c.stem.clear());
         }
         let sensor = match (from_flag, quantity) {

@@ -349,11 +349,11 @@ fn time_notes(timing: &Timing, stamps: &Stamps, rate_hz: f64, rows: u64) -> Vec<
             serious: missing as f64 > 0.1 * rows as f64,
         });
     }
-    repeated(stamps, rows, &mut notes);
+    repeated(stamps, &mut notes);
     notes
 }
 
-fn repeated(stamps: &Stamps, rows: u64, notes: &mut Vec<Note>) {
+fn repeated(stamps: &Stamps, notes: &mut Vec<Note>) {
     if let Count { count, first: Some(first) } = stamps.repeated {
         let message = format!("{count} rows have the time stamp of the row before; kept, evenly spaced");
         notes.push(Note {

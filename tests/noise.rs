@@ -1,6 +1,6 @@
 //! Every noise term against closed forms, quadrature, brute-force sums and its own sample paths.
 
-#[allow(clippy::excessive_precision, reason = "17 digits, as the oracle printed them")]
+#[allow(clippy::excessive_precision, clippy::approx_constant, reason = "17 digits, as the oracle printed them")]
 mod vectors;
 
 use kfdesign::noise::Term;

@@ -68,6 +68,14 @@ mod distribution {
         ] {
             close(chi_square_quantile(p, dof), x, 1e-9, &format!("quantile({p}, {dof})"));
         }
+        // far tails of the expansion invert
+        for dof in [250_000.0, 1e6, 1e9] {
+            for p in [1e-9, 1e-6, 1e-3] {
+                close(chi_square_cdf(chi_square_quantile(p, dof), dof), p, 1e-8, &format!("lower {p} of {dof}"));
+                let x = chi_square_quantile(1.0 - p, dof);
+                close(chi_square_sf(x, dof), 1.0 - (1.0 - p), 1e-8, &format!("upper {p} of {dof}"));
+            }
+        }
         // the two sides of the switch to the expansion agree
         for p in [1e-6, 0.025, 0.5, 0.975, 1.0 - 1e-6] {
             let ratio = chi_square_quantile(p, 200_001.0) - chi_square_quantile(p, 200_000.0);

@@ -187,20 +187,20 @@ mod library {
         assert_eq!(found[0].drift, plain[0].drift, "truth is not rounded");
     }
 
-    /// 5000 runs: (bias − 2 deg/s)/0.5 deg/s is standard normal. Mean within 5 standard errors (5.7e-7), variance in its
+    /// 20 000 runs: (bias − 2 deg/s)/0.5 deg/s is standard normal. Mean within 5 standard errors (5.7e-7), variance in its
     /// chi-square interval (1e-6).
     #[test]
     fn turn_on_bias_is_drawn_per_run() {
         let params = rich();
         let mut moments = Moments::default();
-        for run in 0..5000 {
+        for run in 0..20_000 {
             let axes = simulate(&params, &Scenario { run, turn_on: true, ..scenario(1) }, 1);
             moments.add((axes[0].bias / DEGREE - 2.0) / 0.5);
             assert_eq!(axes[1].bias, 0.0);
         }
-        assert!(moments.mean.abs() < 5.0 / 5000f64.sqrt(), "mean {}", moments.mean);
-        let statistic = moments.variance() * 4999.0;
-        let range = chi_square_quantile(5e-7, 4999.0)..chi_square_quantile(1.0 - 5e-7, 4999.0);
+        assert!(moments.mean.abs() < 5.0 / 20_000f64.sqrt(), "mean {}", moments.mean);
+        let statistic = moments.variance() * 19_999.0;
+        let range = chi_square_quantile(5e-7, 19_999.0)..chi_square_quantile(1.0 - 5e-7, 19_999.0);
         assert!(range.contains(&statistic), "variance {}", moments.variance());
     }
 
@@ -348,9 +348,15 @@ mod command {
         let (header, columns) = parse(&bench.read("rad.csv"));
         assert_eq!(header, ["time (s)", "gyro_x (rad/s)", "gyro_y (rad/s)"]);
         assert_eq!(columns[1], simulate(&rich(), &scenario(50), 50)[0].measured);
-        bench.ok("simulate rich.json -o short.csv --duration 1s --decimals 3");
-        for cell in bench.read("short.csv").lines().skip(1).flat_map(|l| l.split(',')) {
-            assert!(cell.split('.').nth(1).is_none_or(|d| d.len() <= 3) && cell != "-0", "{cell}");
+        for decimals in [3, 0] {
+            bench.ok(&format!("simulate rich.json -o short.csv --duration 1s --decimals {decimals}"));
+            let text = bench.read("short.csv");
+            let rounded: Vec<&str> =
+                text.lines().skip(1).flat_map(|l| l.split_once(',').unwrap().1.split(',')).collect();
+            assert_eq!(rounded.len(), 50 * 8);
+            for cell in rounded {
+                assert!(cell.split('.').nth(1).is_none_or(|d| d.len() <= decimals) && cell != "-0", "{cell}");
+            }
         }
     }
 

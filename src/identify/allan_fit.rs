@@ -5,9 +5,10 @@
 //! one of the lowest score (see [`super::selection`]) whose parameters are all identified. Interval widths shrink as
 //! T^(−1/2) with the length T of the log (Cramér-Rao): from that the log length that would tell.
 
+use super::points::Points;
 use super::selection::{FIT_LEVEL, PENALTY, Table, score, search};
 use super::shape::{Role, Shape, document_name, short_name};
-use super::weighted_fit::{Fit, Points, tolerated};
+use super::weighted_fit::{Fit, tolerated};
 use super::{Candidate, Identified, IdentifyError, ModelChoice, bias, entry, usable};
 use crate::allan::{self, AllanCurve, Deviation, TauGrid};
 use crate::noise::{Kind, NoiseModel, Term};
@@ -15,7 +16,7 @@ use crate::params::{AxisParams, NotIdentified};
 use crate::units::{Unit, digits};
 
 /// Points of the curve per decade of averaging time; denser ones add correlation, not information.
-const POINTS_PER_DECADE: usize = 6;
+const POINTS_PER_DECADE: usize = 5;
 /// Largest upper/lower ratio of a 95 % interval that still says something.
 const WIDEST_INTERVAL: f64 = 10.0;
 /// Two-sided 95 % point of the normal distribution.
@@ -337,9 +338,9 @@ fn largest_tolerated(points: &Points, fit: &Fit, kind: Kind) -> Option<f64> {
         tolerated(points, fit, kind, log_coefficient).map(|chi_square| chi_square - fit.chi_square - 2.706)
     };
     // where the term alone reaches the model's variance at the longest averaging time; far too much
-    let longest = *points.factors.last()?;
-    let unit = super::shape::one_coefficient(kind, 1.0).allan_variance(longest, points.dt);
-    let mut above = 0.5 * (fit.model().allan_variance(longest, points.dt) / unit).ln() + 2.0;
+    let longest = *points.factors().last()?;
+    let unit = super::shape::one_coefficient(kind, 1.0).allan_variance(longest, points.dt());
+    let mut above = 0.5 * (fit.model().allan_variance(longest, points.dt()) / unit).ln() + 2.0;
     let mut below = above - 5.0;
     if excess(above)? < 0.0 || excess(below)? > 0.0 {
         return None;

@@ -5,6 +5,7 @@
 
 pub mod allan_fit;
 pub mod graphical;
+mod points;
 mod selection;
 mod shape;
 mod weighted_fit;

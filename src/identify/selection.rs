@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
+use super::points::Points;
 use super::shape::{KINDS, Shape};
-use super::weighted_fit::{Fit, Points, fit};
+use super::weighted_fit::{Fit, fit};
 use crate::noise::Kind;
 
 /// The score of a model is its χ² plus this for every parameter and again for every process; the lowest score wins.
@@ -14,7 +15,7 @@ use crate::noise::Kind;
 /// prefer Gauss-Markov to the random walk, its limit, it must gain 4 (0.023). Measured rates: docs/validation.md.
 pub(super) const PENALTY: f64 = 4.0;
 /// A fit with a smaller p-value does not explain the curve.
-pub(super) const FIT_LEVEL: f64 = 0.01;
+pub(super) const FIT_LEVEL: f64 = 0.001;
 /// Most Gauss-Markov processes that are looked for.
 const MOST_GAUSS_MARKOV: usize = 2;
 /// Short averaging times may be left out up to this many samples …
@@ -99,7 +100,7 @@ fn neighbours(shape: &Shape) -> Vec<Shape> {
 ///
 /// The rule: only averaging factors up to 100 samples may be left out (anti-alias filters and vibration act there), at least
 /// ten points must remain. A model is found on the points beyond; the shorter ones are then taken in, longest first, as long
-/// as the fit keeps a p-value of 0.01. If no model explains even the long averaging times, nothing is left out, unless the
+/// as the fit keeps a p-value of 0.001. If no model explains even the long averaging times, nothing is left out, unless the
 /// misfit √(χ²/dof) more than halves by it.
 pub(super) fn search(points: &Points, forced: Option<&Shape>) -> Table {
     let find = |points: &Points| match forced {
@@ -115,7 +116,7 @@ pub(super) fn search(points: &Points, forced: Option<&Shape>) -> Table {
         return full;
     }
     let firsts: Vec<u64> = points
-        .factors
+        .factors()
         .iter()
         .enumerate()
         .skip(1)

@@ -11,22 +11,11 @@ use nalgebra::{DMatrix, DVector};
 use slsqp::{Func, StopTols, minimize};
 use statrs::function::gamma::ln_gamma;
 
+use super::points::{Covariance, Points};
 use super::shape::{Role, Shape, one_coefficient};
-use crate::allan::{AllanCurve, edf};
 use crate::noise::{Kind, NoiseModel, Term};
 use crate::numerics::distribution::chi_square_sf;
 use crate::numerics::linalg::cholesky;
-
-/// The measured curve: Allan variances at ascending averaging factors.
-#[derive(Clone, Debug)]
-pub(super) struct Points {
-    pub(super) factors: Vec<u64>,
-    pub(super) variances: Vec<f64>,
-    /// Length of the log behind them.
-    pub(super) samples: usize,
-    /// s.
-    pub(super) dt: f64,
-}
 
 /// The outcome for one model.
 #[derive(Clone, Debug)]
@@ -40,52 +29,11 @@ pub(super) struct Fit {
     pub(super) points: usize,
 }
 
-/// Correlation times shorter than this many samples are a matter of the sensor's bandwidth, not of drift.
-const SHORTEST_CORRELATION: f64 = 10.0;
-/// Correlation times are searched up to this many lengths of the log; further out a Gauss-Markov process is a random walk.
-const LONGEST_CORRELATION: f64 = 3.0;
-/// Starting values of a correlation time, equally spaced in its logarithm.
-const STARTS: usize = 6;
+/// Starting values of one correlation time, equally spaced in its logarithm; of each of several.
+const STARTS: [usize; 2] = [6, 4];
 /// Starts that are carried on from the diagonal to the full weights.
-const CARRIED: usize = 3;
+const CARRIED: usize = 2;
 const REWEIGHTINGS: usize = 8;
-
-impl Points {
-    /// Points at averaging times up to a third of the log (three averages and more).
-    pub(super) fn of_curve(curve: &AllanCurve) -> Points {
-        let used = curve.points.iter().filter(|p| p.m as usize <= curve.samples / 3 && p.deviation > 0.0);
-        let (factors, variances) = used.map(|p| (p.m, p.deviation * p.deviation)).unzip();
-        Points { factors, variances, samples: curve.samples, dt: curve.dt }
-    }
-    pub(super) fn len(&self) -> usize {
-        self.factors.len()
-    }
-    /// The points at and above an averaging factor.
-    pub(super) fn starting_at(&self, first: u64) -> Points {
-        let skip = self.factors.iter().take_while(|m| **m < first).count();
-        Points {
-            factors: self.factors[skip..].to_vec(),
-            variances: self.variances[skip..].to_vec(),
-            samples: self.samples,
-            dt: self.dt,
-        }
-    }
-    pub(super) fn span_s(&self) -> f64 {
-        self.samples as f64 * self.dt
-    }
-    pub(super) fn first_tau_s(&self) -> f64 {
-        self.factors.first().map_or(f64::NAN, |m| *m as f64 * self.dt)
-    }
-
-    fn allan_variances(&self, term: &Term) -> DVector<f64> {
-        DVector::from_iterator(self.len(), self.factors.iter().map(|m| term.allan_variance(*m, self.dt)))
-    }
-    /// Range of correlation times that is searched, s.
-    fn correlation_times(&self) -> (f64, f64) {
-        let shortest = (SHORTEST_CORRELATION * self.dt).max(2.0 * self.first_tau_s());
-        (shortest, (LONGEST_CORRELATION * self.span_s()).max(4.0 * shortest))
-    }
-}
 
 impl Fit {
     pub(super) fn model(&self) -> NoiseModel {
@@ -117,32 +65,31 @@ struct Weights {
 impl Weights {
     /// Independent points, degrees of freedom n/m − 1: good enough to start from.
     fn rough(points: &Points) -> Weights {
-        let edf = points.factors.iter().map(|m| (points.samples as f64 / *m as f64 - 1.0).max(1.0));
+        let edf = points.factors().iter().map(|m| (points.samples() as f64 / *m as f64 - 1.0).max(1.0));
         let (mean, sigma): (Vec<f64>, Vec<f64>) = edf.map(cube_root_moments).unzip();
         Weights {
-            reference: DVector::from_column_slice(&points.variances),
+            reference: DVector::from_column_slice(points.variances()),
             mean: DVector::from_vec(mean),
             factor: DMatrix::from_diagonal(&DVector::from_vec(sigma)),
             observed: DVector::repeat(points.len(), 1.0),
         }
     }
 
-    /// Exact covariance of the points for this model; None where it is not positive definite.
+    /// Covariance of the points for this model; None where it is not positive definite.
     fn exact(points: &Points, model: &NoiseModel) -> Option<Weights> {
-        let reference = points.factors.iter().map(|m| model.allan_variance(*m, points.dt)).collect::<Vec<f64>>();
-        let covariance = edf::covariance(&points.factors, points.samples, points.dt, model);
-        let moments = |i: usize| cube_root_moments(2.0 * reference[i] * reference[i] / covariance[(i, i)]);
+        let Covariance { matrix: covariance, variances } = points.covariance(model);
+        let moments = |i: usize| cube_root_moments(2.0 * variances[i] * variances[i] / covariance[(i, i)]);
         let (mean, sigma): (Vec<f64>, Vec<f64>) = (0..points.len()).map(moments).unzip();
         let scaled = DMatrix::from_fn(points.len(), points.len(), |i, j| {
             let correlation = covariance[(i, j)] / (covariance[(i, i)] * covariance[(j, j)]).sqrt();
             correlation * sigma[i] * sigma[j]
         });
-        let observed = points.variances.iter().zip(&reference).map(|(v, a)| (v / a).cbrt());
+        let reference = model_variances(points, model);
         Some(Weights {
-            observed: DVector::from_iterator(points.len(), observed),
+            observed: DVector::from_column_slice(points.variances()).component_div(&reference).map(f64::cbrt),
             mean: DVector::from_vec(mean),
             factor: cholesky(&scaled).ok()?,
-            reference: DVector::from_vec(reference),
+            reference,
         })
     }
 
@@ -168,6 +115,16 @@ impl Weights {
     }
 }
 
+fn model_variances(points: &Points, model: &NoiseModel) -> DVector<f64> {
+    let variances = points.factors().iter().map(|m| model.allan_variance(*m, points.dt()));
+    DVector::from_iterator(points.len(), variances)
+}
+
+fn term_variances(points: &Points, term: &Term) -> DVector<f64> {
+    let variances = points.factors().iter().map(|m| term.allan_variance(*m, points.dt()));
+    DVector::from_iterator(points.len(), variances)
+}
+
 /// Mean and standard deviation of (χ²_e/e)^(1/3).
 fn cube_root_moments(edf: f64) -> (f64, f64) {
     let variance = 2.0 / (9.0 * edf);
@@ -186,7 +143,7 @@ fn derivatives(points: &Points, shape: &Shape, log_parameters: &[f64]) -> DMatri
     let mut out = DMatrix::zeros(points.len(), 1 + shape.parameters());
     let mut column = 1;
     for term in shape.model(log_parameters).terms {
-        let variances = points.allan_variances(&term);
+        let variances = term_variances(points, &term);
         let mut total = out.column_mut(0);
         total += &variances;
         out.set_column(column, &(2.0 * variances));
@@ -194,7 +151,7 @@ fn derivatives(points: &Points, shape: &Shape, log_parameters: &[f64]) -> DMatri
         if let Term::GaussMarkov { std_dev, correlation_time } = term {
             let at = |shift: f64| {
                 let moved = correlation_time * shift.exp();
-                points.allan_variances(&Term::GaussMarkov { std_dev, correlation_time: moved })
+                term_variances(points, &Term::GaussMarkov { std_dev, correlation_time: moved })
             };
             out.set_column(column, &((at(STEP) - at(-STEP)) / (2.0 * STEP)));
             column += 1;
@@ -226,16 +183,17 @@ fn touch(points: &Points, kind: Kind, correlation_time: f64) -> f64 {
         Kind::GaussMarkov => Term::GaussMarkov { std_dev: 1.0, correlation_time },
         kind => one_coefficient(kind, 1.0),
     };
-    let unit = points.allan_variances(&term);
-    let ratio = points.variances.iter().zip(unit.iter()).map(|(v, u)| v / u).fold(f64::INFINITY, f64::min);
+    let unit = term_variances(points, &term);
+    let ratio = points.variances().iter().zip(unit.iter()).map(|(v, u)| v / u).fold(f64::INFINITY, f64::min);
     0.5 * ratio.ln()
 }
 
 /// Starting points: every combination of correlation times on a grid; each term at half of what touches the curve.
 fn starts(points: &Points, shape: &Shape) -> Vec<Vec<f64>> {
     let (shortest, longest) = points.correlation_times();
-    let step = (longest / shortest).powf(1.0 / STARTS as f64);
-    let grid: Vec<f64> = (0..STARTS).map(|i| shortest * step.powf(i as f64 + 0.5)).collect();
+    let several = usize::from(shape.count(Kind::GaussMarkov) > 1);
+    let step = (longest / shortest).powf(1.0 / STARTS[several] as f64);
+    let grid: Vec<f64> = (0..STARTS[several]).map(|i| shortest * step.powf(i as f64 + 0.5)).collect();
     let mut combinations: Vec<Vec<f64>> = vec![vec![]];
     for _ in 0..shape.count(Kind::GaussMarkov) {
         let longer = |chosen: &Vec<f64>| {
@@ -264,11 +222,12 @@ fn descend(
     weights: &Weights,
     bounds: &[(f64, f64)],
     start: &[f64],
+    restarts: usize,
 ) -> Option<(Vec<f64>, f64)> {
     let mut at: Vec<f64> = start.iter().zip(bounds).map(|(p, (lo, hi))| p.clamp(*lo, *hi)).collect();
     let mut best = f64::INFINITY;
     // the quasi-Newton steps are restarted with fresh scales until they gain nothing
-    for _ in 0..6 {
+    for _ in 0..restarts {
         let here = weights.residuals(points, shape, &at);
         let scale: Vec<f64> =
             (1..here.ncols()).map(|j| 1.0 / here.column(j).norm().clamp(1e-3, 1e6)).map(|s| s.min(1.0)).collect();
@@ -315,7 +274,7 @@ pub(super) fn fit(points: &Points, shape: &Shape) -> Option<Fit> {
     let bounds = bounds(points, shape);
     let rough = Weights::rough(points);
     let mut found: Vec<(Vec<f64>, f64)> =
-        starts(points, shape).iter().filter_map(|start| descend(points, shape, &rough, &bounds, start)).collect();
+        starts(points, shape).iter().filter_map(|start| descend(points, shape, &rough, &bounds, start, 2)).collect();
     found.sort_by(|a, b| a.1.total_cmp(&b.1));
     // different starts that arrived at the same place are one
     found.dedup_by(|b, a| a.0.iter().zip(&b.0).all(|(a, b)| (a - b).abs() < 0.02));
@@ -329,7 +288,7 @@ fn reweighted(points: &Points, shape: &Shape, bounds: &[(f64, f64)], start: &[f6
     let mut last = None;
     for _ in 0..REWEIGHTINGS {
         let weights = Weights::exact(points, &shape.model(&at))?;
-        let (next, half) = descend(points, shape, &weights, bounds, &at)?;
+        let (next, half) = descend(points, shape, &weights, bounds, &at, 6)?;
         let fit = finish(points, shape, &weights, bounds, next.clone(), 2.0 * half);
         let moved = next
             .iter()
@@ -388,5 +347,5 @@ pub(super) fn tolerated(points: &Points, fit: &Fit, kind: Kind, log_coefficient:
     let bounds: Vec<(f64, f64)> =
         shape.roles().iter().zip(&start).map(|((k, _), p)| (p - free(*k), p + free(*k))).collect();
     let weights = Weights::exact(points, &shape.model(&start))?;
-    descend(points, &shape, &weights, &bounds, &start).map(|(_, half)| 2.0 * half)
+    descend(points, &shape, &weights, &bounds, &start, 6).map(|(_, half)| 2.0 * half)
 }

@@ -60,12 +60,20 @@ fn logs(model: &NoiseModel) -> [f64; 3] {
     out
 }
 
-/// Bias, efficiency and coverage of the Allan fit, and how often each model is chosen.
-/// `cargo test --release -- --ignored --nocapture identify_study`
+// ---------------------------------------------------------------------------------------------------------------
+// Studies: `cargo test --release -- --ignored --nocapture identify_study` prints the figures of docs/validation.md
+// ---------------------------------------------------------------------------------------------------------------
+
+/// Logs per row of a study.
+fn study_runs() -> u64 {
+    std::env::var("KFDESIGN_STUDY_RUNS").ok().and_then(|v| v.parse().ok()).unwrap_or(400)
+}
+
+/// Bias, efficiency and coverage of the Allan fit on white noise + Gauss-Markov.
 #[test]
-#[ignore = "a study of several minutes, not a check: it prints the table of docs/validation.md"]
-fn identify_study() {
-    let runs: u64 = std::env::var("KFDESIGN_STUDY_RUNS").ok().and_then(|v| v.parse().ok()).unwrap_or(200);
+#[ignore = "a study of minutes that prints figures, not a check"]
+fn identify_study_of_intervals() {
+    let runs = study_runs();
     let forced = parse_model("white+gm").unwrap();
     // √ of the diagonal of the inverse Whittle information, ln N at 1 Hz, ln σ, ln Tc (formulas: 2 h; scales as T^(-1/2))
     let bound_2h = [8.577e-3, 0.11871, 0.28511];
@@ -107,26 +115,17 @@ fn identify_study() {
             );
         }
     }
-    let unit = Unit::parse("deg/s").unwrap();
-    let (mut read, mut ratios) = (0, Vec::new());
-    for run in 0..runs.min(100) {
-        let rate: Vec<f64> =
-            log(&[white(N), gauss_markov(SIGMA, TC)], 720_000, 0.01, 8, run).iter().map(|x| unit.to_si(*x)).collect();
-        let found = graphical(&rate, 0.01);
-        let [density, _, std_dev, time, _] = [0, 1, 2, 3, 4].map(|i| found.steps[i].value);
-        read += usize::from(time.is_some());
-        ratios.push([density.unwrap() / N, std_dev.unwrap() / SIGMA, time.map_or(f64::NAN, |t| t / TC)]);
-    }
-    println!("graphical recipe, 2 h at 100 Hz, {} logs: a maximum in {read}", ratios.len());
-    for (i, name) in ["N", "sigma_GM", "Tc"].iter().enumerate() {
-        let mut errors: Vec<f64> = ratios.iter().map(|r| r[i].ln()).filter(|e| e.is_finite()).collect();
-        errors.sort_by(f64::total_cmp);
-        let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
-        println!("  {name:8} median read/true {:.3}  rms of ln(read/true) {rms:.4}", errors[errors.len() / 2].exp());
-    }
+}
+
+/// How often each model is chosen.
+#[test]
+#[ignore = "a study of minutes that prints figures, not a check"]
+fn identify_study_of_model_choice() {
+    let runs = study_runs();
     let k = SIGMA * (2.0 / TC).sqrt() / 3.0;
-    let cases: [(&str, Vec<Term>, f64); 7] = [
+    let cases: [(&str, Vec<Term>, f64); 8] = [
         ("white, 2 h", vec![white(N)], 7200.0),
+        ("white + gm, 60 s", vec![white(N), gauss_markov(SIGMA, TC)], 60.0),
         ("white + gm, 2 h", vec![white(N), gauss_markov(SIGMA, TC)], 7200.0),
         ("white + gm, 10 h", vec![white(N), gauss_markov(SIGMA, TC)], 36_000.0),
         ("white + gm, 2000 s", vec![white(N), gauss_markov(SIGMA, TC)], 2000.0),
@@ -144,6 +143,30 @@ fn identify_study() {
             *counts.entry(label(&found.model)).or_insert(0) += 1;
         }
         println!("{name}: {counts:?} of {runs}, {:.2} s a log", started.elapsed().as_secs_f64() / runs as f64);
+    }
+}
+
+/// What the recipe reads off logs of its own model.
+#[test]
+#[ignore = "a study of minutes that prints figures, not a check"]
+fn identify_study_of_the_recipe() {
+    let runs = study_runs();
+    let unit = Unit::parse("deg/s").unwrap();
+    let (mut read, mut ratios) = (0, Vec::new());
+    for run in 0..runs.min(200) {
+        let rate: Vec<f64> =
+            log(&[white(N), gauss_markov(SIGMA, TC)], 720_000, 0.01, 8, run).iter().map(|x| unit.to_si(*x)).collect();
+        let found = graphical(&rate, 0.01);
+        let [density, _, std_dev, time, _] = [0, 1, 2, 3, 4].map(|i| found.steps[i].value);
+        read += usize::from(time.is_some());
+        ratios.push([density.unwrap() / N, std_dev.unwrap() / SIGMA, time.map_or(f64::NAN, |t| t / TC)]);
+    }
+    println!("graphical recipe, 2 h at 100 Hz, {} logs: a maximum in {read}", ratios.len());
+    for (i, name) in ["N", "sigma_GM", "Tc"].iter().enumerate() {
+        let mut errors: Vec<f64> = ratios.iter().map(|r| r[i].ln()).filter(|e| e.is_finite()).collect();
+        errors.sort_by(f64::total_cmp);
+        let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
+        println!("  {name:8} median read/true {:.3}  rms of ln(read/true) {rms:.4}", errors[errors.len() / 2].exp());
     }
 }
 

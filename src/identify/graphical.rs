@@ -32,6 +32,9 @@ pub const WINDOW: usize = 100;
 pub const PEAK_POSITION: f64 = 1.89;
 /// Floor of flicker noise as the recipe has it; √(2 ln 2/π) = 0.664282 to six digits.
 pub const FLICKER_FLOOR: f64 = 0.664;
+/// Averages in the log at the longest averaging time that is read: fewer leave an error of more than 25 % (1/√(2(n/m − 1)), IEEE
+/// Std 952), and the end of the curve then passes for a maximum.
+const FEWEST_AVERAGES: usize = 9;
 /// No maximum exists in white noise + Gauss-Markov when N/(σ√Tc) is larger.
 const LARGEST_RATIO: f64 = 0.35610;
 
@@ -80,7 +83,7 @@ pub(super) fn identify(name: &str, rate: &[f64], dt: f64, display: &Unit) -> Res
         _ => not_identified.push(NotIdentified {
             term: "gauss_markov".into(),
             reason: format!(
-                "no maximum after the minimum of the Allan curve: the recipe has nothing to read the correlation time from \
+                "no maximum after the minimum of the Allan curve up to a ninth of the log: the recipe has nothing to read the correlation time from \
                  (a maximum exists only if N/(σ√Tc) < {LARGEST_RATIO}, and shows only in a log of many Tc)"
             ),
             needed_log_s: None,
@@ -117,8 +120,8 @@ pub(super) fn identify(name: &str, rate: &[f64], dt: f64, display: &Unit) -> Res
 }
 
 fn read(curve: &AllanCurve, rate: &[f64]) -> Reading {
-    // the recipe's eye: points that still are an average of something
-    let points: Vec<&AllanPoint> = curve.points.iter().filter(|p| p.edf >= 2.0 && p.deviation > 0.0).collect();
+    let readable = |p: &&AllanPoint| p.m as usize <= curve.samples / FEWEST_AVERAGES && p.deviation > 0.0;
+    let points: Vec<&AllanPoint> = curve.points.iter().filter(readable).collect();
     let minimum = points.iter().copied().min_by(|a, b| a.deviation.total_cmp(&b.deviation));
     let after = |p: &&&AllanPoint| minimum.is_some_and(|m| p.tau_s > m.tau_s);
     let peak = points.iter().filter(after).copied().max_by(|a, b| a.deviation.total_cmp(&b.deviation));

@@ -205,6 +205,10 @@ fn columns_by_name_number_and_sensor() {
     // names without axis words are the axes of one sensor
     let (log, _) = read("t_s,gyro_north_dps,gyro_east_dps\n0,1,2\n1,2,3\n", &[]).unwrap();
     assert_eq!(log.axes.iter().map(|a| a.name.as_str()).collect::<Vec<_>>(), ["gyro_north", "gyro_east"]);
+    // a byte-order mark before the first number
+    let (log, _) =
+        read("\u{feff}5;1,5\n6;3,25\n7;2\n", &[("columns", "1,2"), ("rate", "1"), ("unit", "rad/s")]).unwrap();
+    assert_eq!((shown(&log, 0), shown(&log, 1)), (vec![5.0, 6.0, 7.0], vec![1.5, 3.25, 2.0]));
     // one column is the column
     let (log, _) = read("0.5\n0.25\n1\n", &[("rate", "10"), ("unit", "1/4 deg/s")]).unwrap();
     assert_close(&log.axes[0].values, &[0.125f64, 0.0625, 0.25].map(f64::to_radians), "one column");

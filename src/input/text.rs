@@ -126,7 +126,8 @@ impl TextTable {
                             None if fraction.is_finite() => *self.origin.insert((whole, fraction)),
                             known => known.unwrap_or((0, 0.0)),
                         };
-                        rows.time.push((whole.wrapping_sub(origin.0)) as f64 + (fraction - origin.1));
+                        let since = i128::from(whole) - i128::from(origin.0);
+                        rows.time.push(since as f64 + (fraction - origin.1));
                         true
                     }
                     None => false,

@@ -2,8 +2,8 @@
 //! motion, outliers; each with count and place. Works in one streaming pass with bounded memory.
 //!
 //! The rules are stated where they are applied: for time in `stamps`, for one axis in `axis`, for whole rows here:
-//! - *Zero row*: every axis exactly 0, more often than the zeros of the single axes in the other rows would make it by chance
-//!   (less than 1 in 10⁶).
+//! - *Zero row*: every axis exactly 0, more often than independent axes with the zeros of each would make it by chance (less than
+//!   1 in 10⁶).
 //! - *Repeated row*: every axis equal to the row before, by the same rule, in more than 1 % of the rows: the sensor is slower
 //!   than the log.
 //!
@@ -175,17 +175,13 @@ impl Checker {
                 return Err(BackwardStamp { row, from_s, to_s: place.time_s });
             }
             self.rows += 1;
-            let (mut zero, mut repeated) = (true, true);
-            for (axis, column) in self.axes.iter_mut().zip(values) {
-                zero &= column[row] == 0.0;
-                repeated &= axis.add(column[row], place);
+            let (mut zero, mut repeated) = (Alike::default(), Alike::default());
+            for (i, (axis, column)) in self.axes.iter_mut().zip(values).enumerate() {
+                zero.look(i, column[row] == 0.0);
+                repeated.look(i, axis.add(column[row], place));
             }
-            if zero {
-                self.zero_rows.add(place);
-            }
-            if repeated {
-                self.repeated_rows.add(place);
-            }
+            zero.count(place, &mut self.zero_rows, &mut self.axes, |axis| &mut axis.only_not_zero);
+            repeated.count(place, &mut self.repeated_rows, &mut self.axes, |axis| &mut axis.only_not_repeated);
         }
         Ok(())
     }
@@ -241,13 +237,16 @@ impl Checker {
         if self.axes.len() < 2 {
             return notes; // one axis cannot be told from its own values
         }
-        // rows by chance, from how often each axis does it in the other rows
-        let by_chance = |count: u64, on_axis: &dyn Fn(&AxisCheck) -> u64| {
-            let others = (rows - count as f64).max(1.0);
-            others * self.axes.iter().map(|axis| (on_axis(axis) - count) as f64 / others).product::<f64>()
+        // rows by chance if the axes are independent: each axis' share is taken from the rows in which some other axis differs
+        let by_chance = |count: u64, of_axis: &dyn Fn(&AxisCheck) -> (u64, u64)| {
+            let share = |axis: &AxisCheck| {
+                let (alike, alone_different) = of_axis(axis);
+                (alike - count) as f64 / (rows - (count + alone_different) as f64).max(1.0)
+            };
+            rows * self.axes.iter().map(share).product::<f64>()
         };
         if let Count { count, first: Some(first) } = self.zero_rows
-            && unlikely(count as f64, by_chance(count, &|axis| axis.zeros))
+            && unlikely(count as f64, by_chance(count, &|axis| (axis.zeros, axis.only_not_zero)))
         {
             notes.push(Note {
                 kind: "zero-row",
@@ -259,7 +258,7 @@ impl Checker {
         }
         if let Count { count, first: Some(first) } = self.repeated_rows
             && count as f64 > 0.01 * rows
-            && unlikely(count as f64, by_chance(count, &|axis| axis.repeats))
+            && unlikely(count as f64, by_chance(count, &|axis| (axis.repeats, axis.only_not_repeated)))
         {
             notes.push(Note {
                 kind: "repeated-row",
@@ -273,6 +272,29 @@ impl Checker {
             });
         }
         notes
+    }
+}
+
+/// Whether the axes of a row are alike (all zero, all repeated), or all but one.
+#[derive(Default)]
+struct Alike {
+    different: usize,
+    which: usize,
+}
+
+impl Alike {
+    fn look(&mut self, axis: usize, alike: bool) {
+        if !alike {
+            self.different += 1;
+            self.which = axis;
+        }
+    }
+    fn count(self, place: Place, all: &mut Count, axes: &mut [AxisCheck], alone: impl Fn(&mut AxisCheck) -> &mut u64) {
+        match self.different {
+            0 => all.add(place),
+            1 => *alone(&mut axes[self.which]) += 1,
+            _ => {}
+        }
     }
 }
 
@@ -356,13 +378,7 @@ fn time_notes(timing: &Timing, stamps: &Stamps, rate_hz: f64, rows: u64) -> Vec<
 fn repeated(stamps: &Stamps, notes: &mut Vec<Note>) {
     if let Count { count, first: Some(first) } = stamps.repeated {
         let message = format!("{count} rows have the time stamp of the row before; kept, evenly spaced");
-        notes.push(Note {
-            kind: "repeated-stamp",
-            count,
-            first: Some(first),
-            message,
-            serious: false,
-        });
+        notes.push(Note { kind: "repeated-stamp", count, first: Some(first), message, serious: false });
     }
 }
 

@@ -97,6 +97,9 @@ pub(super) struct AxisCheck {
     pub(super) range: (f64, f64),
     pub(super) zeros: u64,
     pub(super) repeats: u64,
+    /// Rows in which this axis alone is not zero, or does not repeat.
+    pub(super) only_not_zero: u64,
+    pub(super) only_not_repeated: u64,
     previous: Option<f64>,
     run: (u64, Option<Place>),
     runs: BTreeMap<u64, Count>,
@@ -123,6 +126,8 @@ impl AxisCheck {
             range: (f64::INFINITY, f64::NEG_INFINITY),
             zeros: 0,
             repeats: 0,
+            only_not_zero: 0,
+            only_not_repeated: 0,
             previous: None,
             run: (0, None),
             runs: BTreeMap::new(),

@@ -220,3 +220,155 @@ fn a_log_that_cannot_be_read() {
         ),
     ]);
 }
+
+/// A sound params.json with one piece of text replaced.
+fn params(found: &str, replaced: &str) -> Vec<u8> {
+    let good = r#"{
+  "format": "kfdesign-params/1",
+  "quantity": "angular-rate",
+  "sample_rate": "100 Hz",
+  "axes": [
+    {
+      "name": "x",
+      "bias": "0.1 deg/s",
+      "white": { "density": "0.0562 deg/s/sqrt(Hz)" },
+      "gauss_markov": [{ "std_dev": "0.028 deg/s", "correlation_time": "190 s" }]
+    }
+  ]
+}
+"#;
+    assert!(good.contains(found), "the row replaces nothing: {found}");
+    good.replace(found, replaced).into_bytes()
+}
+
+#[test]
+fn parameters_that_cannot_be_used() {
+    let run = "tune params.json -o out.json --report out.html --plot out.svg";
+    let row = |what, found, replaced, words| (what, "params.json", params(found, replaced), run, words);
+    assert_refused(vec![
+        ("missing file", "", vec![], run, &["params.json: cannot read"] as &[&str]),
+        ("empty file", "params.json", vec![], run, &["params.json: line 1", "not valid JSON"]),
+        row("cut short", "\"axes\": [", "\"axes\": [[", &["params.json", "line", "not valid JSON"]),
+        row(
+            "another format",
+            "kfdesign-params/1",
+            "kfdesign-params/9",
+            &["format", "kfdesign-params/9", "kfdesign-params/1"],
+        ),
+        row("unknown key", "\"white\"", "\"whit\"", &["axes[0]", "whit", "white"]),
+        row("unknown key in a term", "\"density\"", "\"dens\"", &["axes[0].white", "dens", "density"]),
+        row(
+            "wrong unit",
+            "0.0562 deg/s/sqrt(Hz)",
+            "0.0562 deg/s",
+            &["axes[0].white.density", "deg/s", "deg/s/sqrt(Hz)"],
+        ),
+        row("no unit", "\"0.0562 deg/s/sqrt(Hz)\"", "0.0562", &["axes[0].white.density", "unit"]),
+        row("specific force in a gyro", "0.028 deg/s", "0.028 m/s^2", &["axes[0].gauss_markov[0].std_dev", "m/s^2"]),
+        row("negative density", "0.0562 deg", "-0.0562 deg", &["axes[0].white.density", "-0.0562"]),
+        row("not a number", "0.0562 deg", "NaN deg", &["axes[0].white.density", "NaN"]),
+        row("zero correlation time", "190 s", "0 s", &["axes[0].gauss_markov[0].correlation_time", "0"]),
+        row("zero sample rate", "100 Hz", "0 Hz", &["sample_rate", "0"]),
+        row("no white noise", "\"white\": { \"density\": \"0.0562 deg/s/sqrt(Hz)\" },", "", &["x", "white"]),
+        (
+            "no axes",
+            "params.json",
+            br#"{"format": "kfdesign-params/1", "quantity": "angular-rate", "sample_rate": "100 Hz", "axes": []}"#
+                .to_vec(),
+            run,
+            &["axes", "params.json"],
+        ),
+        (
+            "output in no folder",
+            "params.json",
+            params("x", "x"),
+            "tune params.json -o no/such/out.json",
+            &["no/such/out.json"],
+        ),
+        (
+            "output equal to input",
+            "params.json",
+            params("x", "x"),
+            "tune params.json -o params.json",
+            &["params.json", "input"],
+        ),
+        (
+            "output equal to input by another path",
+            "params.json",
+            params("x", "x"),
+            "tune params.json -o ./params.json",
+            &["params.json", "input"],
+        ),
+        (
+            "simulated log over its parameters",
+            "params.json",
+            params("x", "x"),
+            "simulate params.json -o params.json --duration 10s",
+            &["params.json"],
+        ),
+        (
+            "negative duration",
+            "params.json",
+            params("x", "x"),
+            "simulate params.json -o log.csv --duration -5s",
+            &["duration"],
+        ),
+        (
+            "simulated log of no known format",
+            "params.json",
+            params("x", "x"),
+            "simulate params.json -o log.xyz --duration 10s",
+            &["log.xyz", "csv"],
+        ),
+    ]);
+}
+
+/// filter.json of the sound parameters with one change made to its document, and a log beside it.
+fn filter(change: impl Fn(&mut serde_json::Value)) -> Vec<u8> {
+    let bench = Bench::new();
+    bench.file("params.json", params("x", "x"));
+    bench.ok("tune params.json -o filter.json");
+    let mut document: serde_json::Value = serde_json::from_str(&bench.read("filter.json")).unwrap();
+    change(&mut document);
+    serde_json::to_vec(&document).unwrap()
+}
+
+#[test]
+fn filters_that_cannot_be_used() {
+    use serde_json::json;
+    // the log is never reached
+    let run = "replay filter.json log.csv -o out.csv --report out.html --plot out.svg";
+    let row = |what, change: &dyn Fn(&mut serde_json::Value), words| (what, "filter.json", filter(change), run, words);
+    assert_refused(vec![
+        ("missing file", "", vec![], run, &["filter.json: cannot read"] as &[&str]),
+        row("non-square F", &|d| d["axes"][0]["F"] = json!([[1.0, 0.0]]), &["filter.json", "axes[0].F", "2"]),
+        row("asymmetric P0", &|d| d["axes"][0]["P0"][0][1] = json!(1e-3), &["axes[0].P0", "symmetric"]),
+        row("indefinite Q", &|d| d["axes"][0]["Q"][1][1] = json!(-1e-9), &["axes[0].Q", "definite"]),
+        row("R is zero", &|d| d["axes"][0]["R"][0][0] = json!(0.0), &["axes[0].R"]),
+        row("mismatched sizes", &|d| d["axes"][0]["H"] = json!([[1.0, 1.0, 1.0]]), &["axes[0].H", "3"]),
+        row("ragged matrix", &|d| d["axes"][0]["Q"][1] = json!([0.0]), &["axes[0].Q"]),
+        row("x0 too short", &|d| d["axes"][0]["x0"] = json!([0.0]), &["axes[0].x0"]),
+        row("text in a matrix", &|d| d["axes"][0]["F"][0][0] = json!("one"), &["axes[0].F"]),
+        row("null in a matrix", &|d| d["axes"][0]["F"][0][0] = json!(null), &["axes[0].F"]),
+        row("unknown key", &|d| d["axes"][0]["Qq"] = json!(1), &["axes[0]", "Qq"]),
+        row("no axes", &|d| d["axes"] = json!([]), &["axes"]),
+        row("another format", &|d| d["format"] = json!("kfdesign-params/1"), &["format", "kfdesign-filter/1"]),
+    ]);
+}
+
+#[test]
+fn outputs_that_cannot_be_written() {
+    let csv = || log("t_s,gyro_x (deg/s),gyro_y (deg/s)", usize::MAX, "");
+    assert_refused(vec![
+        ("no such folder", "log.csv", csv(), "allan log.csv -o no/such/out.json", &["no/such/out.json: cannot write"]),
+        (
+            "plot in no folder",
+            "log.csv",
+            csv(),
+            "allan log.csv --plot no/such/out.svg",
+            &["no/such/out.svg: cannot write"],
+        ),
+        ("output equal to input", "log.csv", csv(), "allan log.csv -o log.csv", &["log.csv", "input"]),
+        ("plot equal to input", "log.csv", csv(), "allan log.csv --plot log.csv", &["log.csv", "input"]),
+    ]);
+}

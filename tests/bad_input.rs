@@ -243,10 +243,13 @@ fn params(found: &str, replaced: &str) -> Vec<u8> {
 
 #[test]
 fn parameters_that_cannot_be_used() {
-    let run = "tune params.json -o out.json --report out.html --plot out.svg";
-    let row = |what, found, replaced, words| (what, "params.json", params(found, replaced), run, words);
+    let run = "tune params.json -o out.json";
+    fn row<'a>(what: &'a str, found: &str, replaced: &str, words: &'a [&'a str]) -> Row<'a> {
+        let run = "tune params.json -o out.json --report out.html --plot out.svg";
+        (what, "params.json", params(found, replaced), run, words)
+    }
     assert_refused(vec![
-        ("missing file", "", vec![], run, &["params.json: cannot read"] as &[&str]),
+        ("missing file", "", vec![], run, &["params.json: cannot read"]),
         ("empty file", "params.json", vec![], run, &["params.json: line 1", "not valid JSON"]),
         row("cut short", "\"axes\": [", "\"axes\": [[", &["params.json", "line", "not valid JSON"]),
         row(
@@ -337,10 +340,13 @@ fn filter(change: impl Fn(&mut serde_json::Value)) -> Vec<u8> {
 fn filters_that_cannot_be_used() {
     use serde_json::json;
     // the log is never reached
-    let run = "replay filter.json log.csv -o out.csv --report out.html --plot out.svg";
-    let row = |what, change: &dyn Fn(&mut serde_json::Value), words| (what, "filter.json", filter(change), run, words);
+    fn row<'a>(what: &'a str, change: &dyn Fn(&mut serde_json::Value), words: &'a [&'a str]) -> Row<'a> {
+        let run = "replay filter.json log.csv -o out.csv --report out.html --plot out.svg";
+        (what, "filter.json", filter(change), run, words)
+    }
+    let run = "replay filter.json log.csv -o out.csv";
     assert_refused(vec![
-        ("missing file", "", vec![], run, &["filter.json: cannot read"] as &[&str]),
+        ("missing file", "", vec![], run, &["filter.json: cannot read"]),
         row("non-square F", &|d| d["axes"][0]["F"] = json!([[1.0, 0.0]]), &["filter.json", "axes[0].F", "2"]),
         row("asymmetric P0", &|d| d["axes"][0]["P0"][0][1] = json!(1e-3), &["axes[0].P0", "symmetric"]),
         row("indefinite Q", &|d| d["axes"][0]["Q"][1][1] = json!(-1e-9), &["axes[0].Q", "definite"]),

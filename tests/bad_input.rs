@@ -313,7 +313,7 @@ fn parameters_that_cannot_be_used() {
             "negative duration",
             "params.json",
             params("x", "x"),
-            "simulate params.json -o log.csv --duration -5s",
+            "simulate params.json -o log.csv --duration=-5s",
             &["duration"],
         ),
         (
@@ -349,7 +349,8 @@ fn filters_that_cannot_be_used() {
         ("missing file", "", vec![], run, &["filter.json: cannot read"]),
         row("non-square F", &|d| d["axes"][0]["F"] = json!([[1.0, 0.0]]), &["filter.json", "axes[0].F", "2"]),
         row("asymmetric P0", &|d| d["axes"][0]["P0"][0][1] = json!(1e-3), &["axes[0].P0", "symmetric"]),
-        row("indefinite Q", &|d| d["axes"][0]["Q"][1][1] = json!(-1e-9), &["axes[0].Q", "definite"]),
+        row("negative variance", &|d| d["axes"][0]["Q"][1][1] = json!(-1e-9), &["axes[0].Q[1][1]", "negative"]),
+        row("indefinite Q", &|d| d["axes"][0]["Q"] = json!([[1e-9, 1e-6], [1e-6, 1e-9]]), &["axes[0].Q", "definite"]),
         row("R is zero", &|d| d["axes"][0]["R"][0][0] = json!(0.0), &["axes[0].R"]),
         row("mismatched sizes", &|d| d["axes"][0]["H"] = json!([[1.0, 1.0, 1.0]]), &["axes[0].H", "3"]),
         row("ragged matrix", &|d| d["axes"][0]["Q"][1] = json!([0.0]), &["axes[0].Q"]),

@@ -148,7 +148,7 @@ pub(super) struct AxisCurve {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     for output in args.output.iter().chain(&args.plot) {
-        atomic::refuse_input_as_output(output, &args.log)?;
+        atomic::check_output(output, &args.log)?;
     }
     let options = args.reading.options()?;
     let (recording, check) = crate::input::read(&args.log, &options)?;

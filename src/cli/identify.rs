@@ -126,7 +126,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         );
     }
     for output in [&args.output, &args.report, &args.plot].into_iter().flatten() {
-        atomic::refuse_input_as_output(output, &args.log)?;
+        atomic::check_output(output, &args.log)?;
     }
     let options = args.reading.options()?;
     let (recording, check) = crate::input::read(&args.log, &options)?;

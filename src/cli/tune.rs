@@ -13,7 +13,7 @@ use super::Status;
 use super::log_flags::{LogFlags, print_check};
 use super::output::{print_json, print_text, progress};
 use crate::consistency::Verdict;
-use crate::export::atomic::{self, refuse_input_as_output};
+use crate::export::atomic;
 use crate::input::{Block, LogReader};
 use crate::model::Plant;
 use crate::montecarlo::{Outcome, Plan, verify};
@@ -74,7 +74,7 @@ struct Printed<'a> {
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     for output in [&args.output, &args.report, &args.plot].into_iter().flatten() {
         for input in std::iter::once(&args.params).chain(&args.log) {
-            refuse_input_as_output(output, input)?;
+            atomic::check_output(output, input)?;
         }
     }
     let params = Params::read(&args.params)?;

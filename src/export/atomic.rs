@@ -37,6 +37,16 @@ pub fn refuse_input_as_output(output: &Path, input: &Path) -> Result<(), WriteEr
     }
 }
 
+/// Says before the work what would be said after it: the output is the input file, or cannot be written. Nothing is left behind.
+pub fn check_output(output: &Path, input: &Path) -> Result<(), WriteError> {
+    refuse_input_as_output(output, input)?;
+    // a pipe is not opened twice: its reader would take the first end for the only one
+    if fs::metadata(output).map_or(true, |target| target.is_file()) {
+        drop(AtomicFile::create(output)?);
+    }
+    Ok(())
+}
+
 /// A file in the making; nothing appears at its path before [`AtomicFile::commit`], and a dropped one leaves nothing behind.
 ///
 /// A path that is no regular file (`/dev/null`, a pipe) is written directly: there is nothing to rename over.

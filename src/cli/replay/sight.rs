@@ -80,7 +80,8 @@ fn figures(result: &ReplayResult, axis: &AxisResult, unit: Option<&Unit>) -> Vec
         time_s: time_s.clone(),
         estimate: sight.trace.iter().map(|p| shown(p.estimate)).collect(),
         sigma: sight.trace.iter().map(|p| shown(p.sigma)).collect(),
-        truth: (count > 1).then(|| Curve {
+        truth: None,
+        measured: (count > 1).then(|| Curve {
             label: format!("log, mean of {count} samples"),
             points: sight.trace.iter().map(|p| (p.time_s, shown(p.measured))).collect(),
         }),

@@ -2,8 +2,9 @@
 
 use super::text::{self, Group, View, shown};
 use crate::cli::output::digits;
+use crate::montecarlo::{AxisOutcome, Outcome};
 use crate::replay::ReplayResult;
-use crate::report::figure::{self, BudgetItem, Sigma, SigmaState};
+use crate::report::figure::{self, BudgetItem, Nees, Sigma, SigmaState};
 use crate::report::page::{Badge, Page, Section};
 use crate::units::Quantity;
 
@@ -43,6 +44,7 @@ pub(super) fn page(view: &View<'_>, replay: Option<&ReplayResult>) -> Page {
     sections.push(
         Section::new("Verification by Monte Carlo")
             .paragraph(text::verification_sentence(outcome, params.sample_rate_hz))
+            .figures(outcome.axes.iter().map(|axis| (nees(axis, outcome), String::new())).collect())
             .table(
                 "Mean NEES per state and mean NIS: 1 when the covariance is right",
                 &header,
@@ -120,6 +122,18 @@ fn sigma(group: &Group<'_>, quantity: Quantity) -> String {
         time_s: predicted.time_s.clone(),
         states,
         settling_time_s: group.report.drift_settling_time_s,
+    })
+}
+
+fn nees(axis: &AxisOutcome, outcome: &Outcome) -> String {
+    figure::nees(&Nees {
+        title: format!("{}: NEES of {} runs", axis.name, outcome.runs),
+        time_s: axis.epochs.iter().map(|e| e.time_s).collect(),
+        nees: axis.epochs.iter().map(|e| e.anees).collect(),
+        lower: axis.epochs.iter().map(|e| e.lower).collect(),
+        upper: axis.epochs.iter().map(|e| e.upper).collect(),
+        expected: 1.0,
+        band_label: format!("{} % at each time", digits(100.0 * (1.0 - outcome.alpha))),
     })
 }
 

@@ -4,6 +4,7 @@ use super::chart::{Axis, Chart};
 use super::scale::Scale;
 use super::style::Class;
 use super::trace::Clock;
+use crate::units::digits;
 
 /// Autocorrelation of the normalised innovations at lags 1, 2, …
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -127,29 +128,26 @@ pub struct Nees {
     pub band_label: String,
 }
 
-/// Average NEES with its pointwise band; a few times are dots, times over more than two decades stand on a logarithmic axis.
+/// Average NEES with its pointwise band; a few times stand beside each other as dots, many are a line over time.
 pub fn nees(data: &Nees) -> String {
-    let few = data.nees.len() <= 30;
-    let spread = data.time_s.last().copied().unwrap_or(0.0) / data.time_s.first().copied().unwrap_or(0.0);
-    let (clock, time) = if spread.is_finite() && spread > 100.0 {
-        let scale = Scale::log(data.time_s.iter().copied());
-        (Clock::seconds(), Axis { name: "time".into(), unit: "s".into(), scale })
+    let few = data.nees.len() <= 12;
+    let clock = Clock::covering(&data.time_s);
+    let time = if few {
+        let names = data.time_s.iter().map(|&t| short(t)).collect();
+        Axis { name: "time".into(), unit: "s".into(), scale: Scale::named(names) }
     } else {
-        let clock = Clock::covering(&data.time_s);
-        let mut axis = clock.axis();
-        if few {
-            axis.scale = Scale::linear_padded(data.time_s.iter().map(|&t| clock.show(t)), &[]);
-        }
-        (clock, axis)
+        clock.axis()
     };
+    let place = |i: usize, t: f64| if few { i as f64 } else { clock.show(t) };
     let values = data.nees.iter().chain(&data.lower).chain(&data.upper).copied();
+    let outside = data.nees.iter().zip(data.lower.iter().zip(&data.upper)).filter(|(v, (l, u))| *v < l || *v > u);
     let mut chart = Chart::new(
         &data.title,
         &format!(
             "Average NEES at {} times; expected {:.3}; {} outside their pointwise bounds.",
             data.nees.len(),
             data.expected,
-            data.nees.iter().zip(data.lower.iter().zip(&data.upper)).filter(|(v, (l, u))| *v < l || *v > u).count()
+            outside.count()
         ),
         time,
         Axis {
@@ -158,10 +156,17 @@ pub fn nees(data: &Nees) -> String {
             scale: Scale::linear_padded(values, &[data.expected]),
         },
     );
-    let times = || data.time_s.iter().map(|&t| clock.show(t));
-    chart.band(5, times().zip(data.lower.iter().zip(&data.upper)).map(|(t, (&l, &u))| (t, l, u)).collect());
+    let bounds = data.time_s.iter().enumerate().zip(data.lower.iter().zip(&data.upper));
+    let band: Vec<(f64, f64, f64)> = if few {
+        // a step over each time
+        bounds.flat_map(|((i, _), (&l, &u))| [-0.5, 0.5].map(|half| (i as f64 + half, l, u))).collect()
+    } else {
+        bounds.map(|((_, &t), (&l, &u))| (clock.show(t), l, u)).collect()
+    };
+    chart.band(5, band);
     chart.level(Class::Expected, data.expected);
-    let points: Vec<(f64, f64)> = times().zip(data.nees.iter().copied()).collect();
+    let points: Vec<(f64, f64)> =
+        data.time_s.iter().enumerate().zip(&data.nees).map(|((i, &t), &v)| (place(i, t), v)).collect();
     if few {
         chart.dots(0, points);
         chart.legend_dots(0, "average over runs");
@@ -172,4 +177,14 @@ pub fn nees(data: &Nees) -> String {
     chart.legend_line(Class::Expected, "expected");
     chart.legend_band(5, &data.band_label);
     chart.render()
+}
+
+/// Four digits without trailing zeros: 0.6, 180.
+fn short(value: f64) -> String {
+    let text = digits(value);
+    if text.contains('.') && !text.contains('e') {
+        text.trim_end_matches('0').trim_end_matches('.').into()
+    } else {
+        text
+    }
 }

@@ -17,8 +17,10 @@ pub(super) struct Scale {
     labels: Labels,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 enum Labels {
+    /// Places 0, 1, 2 … have names.
+    Names(Vec<String>),
     /// Fixed decimals after division by 10^factor.
     Fixed { decimals: usize, factor: i32 },
     /// 0.01, 1, 500.
@@ -54,6 +56,13 @@ impl Scale {
         let factor = if (-2..5).contains(&power) { 0 } else { power };
         let decimals = (f64::from(factor) - (step * (1.0 + 1e-9)).log10().floor()).max(0.0) as usize;
         Scale { low, high, logarithmic: false, major, minor: vec![], labels: Labels::Fixed { decimals, factor } }
+    }
+
+    /// As [`Scale::linear_between`], up to the next tick if that is very near.
+    pub(super) fn linear_to_tick(low: f64, high: f64, ticks: f64) -> Scale {
+        let step = round_step((high - low) / ticks);
+        let next = (high / step).ceil() * step;
+        Scale::linear_between(low, if next - high < 0.02 * (high - low) { next } else { high }, ticks)
     }
 
     /// As [`Scale::linear`], widened by 4 % of the span at both ends so that no mark touches the frame.
@@ -94,6 +103,13 @@ impl Scale {
         Scale { low: 10f64.powf(low), high: 10f64.powf(high), logarithmic: true, major, minor, labels }
     }
 
+    /// One place per name, at 0, 1, 2 …
+    pub(super) fn named(names: Vec<String>) -> Scale {
+        let count = names.len().max(1) as f64;
+        let major = (0..names.len()).map(|i| i as f64).collect();
+        Scale { low: -0.5, high: count - 0.5, logarithmic: false, major, minor: vec![], labels: Labels::Names(names) }
+    }
+
     /// Position in 0..=1 along the axis; outside it below 0 or above 1, not a number for what a log scale cannot show.
     pub(super) fn to_unit(&self, value: f64) -> f64 {
         if self.logarithmic {
@@ -117,6 +133,7 @@ impl Scale {
 
     pub(super) fn tick_label(&self, value: f64) -> String {
         match self.labels {
+            Labels::Names(ref names) => names.get(value.round().max(0.0) as usize).cloned().unwrap_or_default(),
             Labels::Fixed { decimals, factor } => {
                 let scaled = value / 10f64.powi(factor);
                 let scaled = if scaled.abs() < 0.5 * 10f64.powi(-(decimals as i32)) { 0.0 } else { scaled };

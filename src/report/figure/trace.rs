@@ -53,8 +53,8 @@ pub fn sigma(data: &Sigma) -> String {
         chart.line(Class::Line(k), data.time_s.iter().copied().zip(state.sigma.iter().copied()).collect());
         chart.legend_line(Class::Line(k), &state.name);
     }
-    if data.states.iter().any(|s| s.steady.is_some()) {
-        chart.legend_line(Class::Thin(0), "steady state");
+    if let Some(first) = data.states.iter().position(|s| s.steady.is_some()) {
+        chart.legend_line(Class::Thin(first), "steady state");
     }
     if settling.is_some() {
         chart.legend_line(Class::Expected, "settling time");
@@ -72,8 +72,10 @@ pub struct Estimate {
     pub time_s: Vec<f64>,
     pub estimate: Vec<f64>,
     pub sigma: Vec<f64>,
-    /// Known truth, or a measured reference, at the same times.
+    /// Known truth.
     pub truth: Option<Curve>,
+    /// What was measured, averaged as far as it helps to see; it may run out of the frame.
+    pub measured: Option<Curve>,
 }
 
 /// The estimate with bands of one and three sigma.
@@ -86,17 +88,21 @@ pub fn estimate(data: &Estimate) -> String {
     let settled = data.time_s.len() / 20;
     let edges = at(3.0).skip(settled).flat_map(|(_, low, high)| [low, high]);
     let truth = data.truth.iter().flat_map(|c| c.points.iter().map(|p| p.1));
+    let seen: Vec<f64> = edges.chain(truth).filter(|v| v.is_finite()).collect();
+    let (low, high) = seen.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
+    // measurements scatter far more than estimates: show enough of them to see where they lie
+    let room = if data.measured.is_some() && low < high { 0.5 * (high - low) } else { 0.0 };
+    let ends = if low <= high { vec![low - room, high + room] } else { vec![] };
     let mut chart = Chart::new(
         &data.title,
         &format!("{} over time with bands of one and three standard deviations.", data.quantity),
         clock.axis(),
-        Axis {
-            name: data.quantity.clone(),
-            unit: data.unit.clone(),
-            scale: Scale::linear_padded(edges.chain(truth), &[]),
-        },
+        Axis { name: data.quantity.clone(), unit: data.unit.clone(), scale: Scale::linear_padded(ends, &[]) },
     );
     let scaled = |k: f64| at(k).map(|(t, low, high)| (clock.show(t), low, high)).collect::<Vec<_>>();
+    if let Some(measured) = &data.measured {
+        chart.line(Class::Thread(5), measured.points.iter().map(|&(t, x)| (clock.show(t), x)).collect());
+    }
     chart.band(0, scaled(3.0));
     chart.band(0, scaled(1.0));
     if let Some(truth) = &data.truth {
@@ -107,6 +113,9 @@ pub fn estimate(data: &Estimate) -> String {
     chart.legend_bands(0, "±1σ and ±3σ");
     if let Some(truth) = &data.truth {
         chart.legend_line(Class::Truth, &truth.label);
+    }
+    if let Some(measured) = &data.measured {
+        chart.legend_line(Class::Thread(5), &measured.label);
     }
     chart.render()
 }
@@ -177,17 +186,15 @@ impl Clock {
         Clock { divisor, unit, low, high }
     }
 
-    pub(super) fn seconds() -> Clock {
-        Clock { divisor: 1.0, unit: "s", low: 0.0, high: 0.0 }
-    }
-
     pub(super) fn show(&self, time_s: f64) -> f64 {
         time_s / self.divisor
     }
 
     pub(super) fn axis(&self) -> Axis {
         let scale = if self.high > self.low {
-            Scale::linear_between(self.show(self.low), self.show(self.high), 6.0)
+            // a record that starts nearly at zero, as the mean of a first stretch does, starts at zero
+            let low = if self.low > 0.0 && self.low < 0.02 * self.high { 0.0 } else { self.low };
+            Scale::linear_to_tick(self.show(low), self.show(self.high), 6.0)
         } else {
             Scale::linear([self.low], &[])
         };

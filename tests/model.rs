@@ -358,3 +358,13 @@ fn augmentation_refuses_what_no_filter_can_use() {
     assert!(built(&white, 0.1, -1.0).is_err());
     assert_eq!(built(&white, 0.1, 1.0).unwrap().states.len(), 1);
 }
+
+#[test]
+fn a_chain_of_drifts_for_flicker_is_observable_to_its_last_state() {
+    let noise = NoiseModel { terms: vec![Term::White { density: 1e-3 }, Term::BiasInstability { coefficient: 1e-4 }] };
+    let model = augment(Plant::Static, Quantity::AngularRate, &noise, bias(0.0, 1e-2), 0.01, 1e5).unwrap();
+    let found = observability(&model).unwrap();
+    assert!(model.states.len() > 8, "{}", model.states.len());
+    assert_eq!((found.rank, found.unobservable.len()), (model.states.len(), 0), "condition {:e}", found.condition);
+    assert_eq!(found.undriven, ["bias"]);
+}

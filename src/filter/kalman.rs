@@ -14,6 +14,8 @@ macro_rules! for_size {
             2 => $kernel(2, $($argument),*),
             3 => $kernel(3, $($argument),*),
             4 => $kernel(4, $($argument),*),
+            5 => $kernel(5, $($argument),*),
+            6 => $kernel(6, $($argument),*),
             n => $kernel(n, $($argument),*),
         }
     };

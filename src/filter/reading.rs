@@ -82,7 +82,7 @@ fn axis(place: &Place<'_>, quantity: Quantity, plant: Plant, dt: f64) -> Result<
 /// The matrices as they stand; [`LinearModel::check`] judges them.
 fn model(object: &Object<'_>, quantity: Quantity, plant: Plant, dt: f64) -> Result<LinearModel, KeyError> {
     let states = named_list(&object.required("states")?)?;
-    let inputs = object.optional("inputs").map_or(Ok(Vec::new()), |place| named_list(&place))?;
+    let inputs = object.optional("inputs").map_or(Ok(Vec::new()), |place| inputs(&place, plant))?;
     let (mut measurements, mut every) = (Vec::new(), Vec::new());
     for place in object.required("measurements")?.list()? {
         let entry = place.object(&["name", "unit", "every"])?;
@@ -107,6 +107,15 @@ fn model(object: &Object<'_>, quantity: Quantity, plant: Plant, dt: f64) -> Resu
         measurements,
         every,
     })
+}
+
+fn inputs(place: &Place<'_>, plant: Plant) -> Result<Vec<Named>, KeyError> {
+    let inputs = named_list(place)?;
+    let expected = plant.inputs().len();
+    if inputs.len() != expected {
+        return Err(place.error(format!("found {}; the plant '{}' has {expected}", inputs.len(), plant.name())));
+    }
+    Ok(inputs)
 }
 
 /// G may be left out or be `[]` when there are no inputs.

@@ -52,7 +52,7 @@ pub fn augment(
     let mut model = LinearModel {
         dt,
         states: Vec::with_capacity(n),
-        inputs: Vec::new(),
+        inputs: plant.inputs(),
         measurements: plant.measurements(quantity),
         every: vec![1],
         f: DMatrix::zeros(n, n),

@@ -28,6 +28,13 @@ impl Plant {
         })
     }
 
+    /// What the filter is given: a resting sensor has no input.
+    pub fn inputs(self) -> Vec<Named> {
+        match self {
+            Plant::Static => Vec::new(),
+        }
+    }
+
     /// What the filter measures.
     pub fn measurements(self, quantity: Quantity) -> Vec<Named> {
         match self {

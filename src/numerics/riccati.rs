@@ -113,7 +113,7 @@ impl Flow {
 /// The same by the stable eigenvectors of the symplectic pencil (faer): the independent check.
 ///
 /// [Fᵀ 0; −Q I] v = λ [I HᵀR⁻¹H; 0 F] v, P = U₂ U₁⁻¹ from the n eigenvectors with |λ| < 1.
-/// Loses digits as the closed-loop poles crowd the unit circle (formulas with measured digits: docs/validation.md).
+/// Loses digits as the closed-loop poles crowd the unit circle.
 /// Source: Pappas, Laub, Sandell 1980, IEEE Trans. Automatic Control 25.
 pub fn dare_eigenvector(
     f: &DMatrix<f64>,

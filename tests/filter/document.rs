@@ -6,7 +6,7 @@ use kfdesign::params::{AxisParams, Measured, TermEntry};
 use kfdesign::units::{Quantity, Unit};
 use serde_json::{Value, json};
 
-use super::{bias_and_drift, drift};
+use super::{bias_and_drift, drift, model};
 
 fn axis(name: &str, model: LinearModel) -> AxisDesign {
     let unit = |text: &str, value| Measured { value, unit: Unit::parse(text).unwrap(), interval: None };
@@ -25,11 +25,21 @@ fn axis(name: &str, model: LinearModel) -> AxisDesign {
 
 fn design() -> FilterDesign {
     let two = LinearModel { dt: 0.01, ..bias_and_drift() };
+    // Nothing symmetric that need not be: a transposed matrix would show.
+    let dense = model(
+        &[&[0.9, 0.1 / 3.0], &[-0.2, 0.7]],
+        &[1.0, 1.0 / 7.0],
+        &[&[0.02, 0.005], &[0.005, 0.03]],
+        0.25,
+        &[0.5, -0.2],
+        &[&[1.0, 0.3], &[0.3, 0.5]],
+    );
+    let dense = LinearModel { dt: 0.01, ..dense };
     FilterDesign {
         quantity: Quantity::AngularRate,
         sample_rate_hz: 100.0,
         plant: "static".into(),
-        axes: vec![axis("x", two), axis("y", drift(0.1 / 3.0, 100.0 / 7.0, 0.05, 0.01))],
+        axes: vec![axis("x", two), axis("y", drift(0.1 / 3.0, 100.0 / 7.0, 0.05, 0.01)), axis("z", dense)],
         tuning: json!({ "method": "exact", "moved": [1, 2.5, "R"] }),
     }
 }
@@ -126,7 +136,7 @@ fn what_can_be_computed_may_be_left_out() {
 #[test]
 fn every_fault_is_named_with_file_and_key() {
     type Change = fn(&mut Value);
-    let cases: [(&str, Change); 31] = [
+    let cases: [(&str, Change); 32] = [
         ("f.json: format: missing; a filter file has", |v| {
             v.as_object_mut().unwrap().remove("format");
         }),
@@ -149,6 +159,9 @@ fn every_fault_is_named_with_file_and_key() {
         ("f.json: axes[0].states[0].unit: unknown unit", |v| v["axes"][0]["states"][0]["unit"] = json!("furlong")),
         ("f.json: axes[0].measurements: found 0 measurements; the plant 'static' has 1", |v| {
             v["axes"][0]["measurements"] = json!([]);
+        }),
+        ("f.json: axes[0].inputs: found 1; the plant 'static' has 0", |v| {
+            v["axes"][0]["inputs"] = json!([{ "name": "u", "unit": "rad/s" }]);
         }),
         ("f.json: axes[0].measurements[0].unit: found rad; expected rad/s", |v| {
             v["axes"][0]["measurements"][0]["unit"] = json!("rad");

@@ -355,6 +355,30 @@ fn a_wrong_design_is_caught() {
     }
 }
 
+/// With other states than the filter's, the truth is compared by the whole drift: the same truth in another order passes
+/// (false alarm 1e-5), a second process that the filter does not have is seen.
+#[test]
+fn a_truth_of_other_states_is_judged_by_the_whole_drift() {
+    let plan = Plan { runs: 100, steps: 3000, seed: 2, alpha: 1e-5 };
+    let design = tuned(&sensor(10.0, vec![white(0.05), gauss_markov(0.03, 20.0)], Some(0.1))).design;
+    let mut reordered = design.clone();
+    let model = &mut reordered.axes[0].model;
+    model.states.swap(0, 1);
+    for matrix in [&mut model.f, &mut model.q, &mut model.p0] {
+        matrix.swap_rows(0, 1);
+        matrix.swap_columns(0, 1);
+    }
+    let same = verify_against(&design, &reordered, &plan, &|_| ()).unwrap();
+    assert_eq!(same.verdict, Verdict::Consistent, "{:#?}", same.tests);
+    let walk = tuned(&sensor(10.0, vec![white(0.05), random_walk(1e-3)], Some(0.1))).design;
+    let more = tuned(&sensor(10.0, vec![white(0.05), random_walk(1e-3), gauss_markov(0.03, 20.0)], Some(0.1))).design;
+    let missing = verify_against(&walk, &more, &plan, &|_| ()).unwrap();
+    assert_eq!(missing.verdict, Verdict::Inconsistent, "{:#?}", missing.tests);
+    let mut other_rate = design.clone();
+    other_rate.sample_rate_hz = 20.0;
+    assert!(verify_against(&design, &other_rate, &plan, &|_| ()).unwrap_err().to_string().contains("20 Hz"));
+}
+
 #[test]
 fn the_verification_is_the_same_for_any_number_of_threads_and_axes() {
     let params = skydog();

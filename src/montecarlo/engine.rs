@@ -42,6 +42,8 @@ pub(super) struct Axis {
 #[derive(Clone, Debug)]
 pub(super) struct EpochPlan {
     pub(super) step: u64,
+    /// The error is that of every state; else that of the whole drift.
+    all_states: bool,
     /// L⁻¹ of the error's covariance L Lᵀ: error to independent N(0, 1).
     whiten: DMatrix<f64>,
 }
@@ -163,10 +165,15 @@ impl Axis {
             axis.gains.extend((&filter.p * model.h.transpose() / model.r[(0, 0)]).iter());
             if wanted.contains(&step) {
                 // states that are known exactly have no NEES; the whole drift always has one
-                let whiten = whitening(&filter.p, model, same_states)
-                    .or_else(|_| whitening(&filter.p, model, false))
-                    .map_err(|e| failed("P(k|k)", e))?;
-                axis.epochs.push(EpochPlan { step, whiten });
+                let all = if same_states { whitening(&filter.p).ok() } else { None };
+                let all_states = all.is_some();
+                let whiten = match all {
+                    Some(whiten) => whiten,
+                    None => {
+                        whitening(&(&model.h * &filter.p * model.h.transpose())).map_err(|e| failed("P(k|k)", e))?
+                    }
+                };
+                axis.epochs.push(EpochPlan { step, all_states, whiten });
             }
         }
         Ok(axis)
@@ -206,7 +213,7 @@ impl Axis {
                 (block, filled) = (0.0, 0);
             }
             if let Some((i, epoch)) = epochs.next_if(|(_, epoch)| epoch.step == step as u64) {
-                let error = if epoch.size() == n {
+                let error = if epoch.all_states {
                     DVector::from_fn(n, |i, _| truth[i] - x[i])
                 } else {
                     DVector::from_element(1, self.truth.measure(&truth) - self.filter.measure(&x))
@@ -287,10 +294,9 @@ impl Root {
     }
 }
 
-/// L⁻¹ of the covariance of the error: of all states, or of the whole drift.
-fn whitening(p: &DMatrix<f64>, model: &LinearModel, all_states: bool) -> Result<DMatrix<f64>, LinalgError> {
-    let covariance = if all_states { p.clone() } else { &model.h * p * model.h.transpose() };
-    let l = cholesky(&covariance)?;
+/// L⁻¹ of a covariance L Lᵀ.
+fn whitening(covariance: &DMatrix<f64>) -> Result<DMatrix<f64>, LinalgError> {
+    let l = cholesky(covariance)?;
     let identity = DMatrix::identity(l.nrows(), l.nrows());
     l.solve_lower_triangular(&identity).ok_or(LinalgError::Singular)
 }

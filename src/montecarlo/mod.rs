@@ -122,8 +122,8 @@ fn check_plan(plan: &Plan) -> Result<(), MonteCarloError> {
     if plan.runs < 2 {
         return wrong("runs", plan.runs as f64, "at least 2");
     }
-    if !(16..=100_000_000).contains(&plan.steps) {
-        return wrong("steps", plan.steps as f64, "16 to 100 million");
+    if !(16..=1_000_000).contains(&plan.steps) {
+        return wrong("steps", plan.steps as f64, "16 to 1 000 000");
     }
     if !(plan.alpha > 0.0 && plan.alpha < 1.0) {
         return wrong("alpha", plan.alpha, "between 0 and 1");

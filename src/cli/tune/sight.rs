@@ -20,7 +20,7 @@ pub(super) fn page(view: &View<'_>, replay: Option<&ReplayResult>) -> Page {
     let mut provenance = vec![
         ("parameters".to_string(), view.name.to_string()),
         ("plant".to_string(), view.tuned.design.plant.clone()),
-        ("sample rate".to_string(), format!("{} Hz", digits(params.sample_rate_hz))),
+        ("sample rate".to_string(), format!("{} Hz", params.sample_rate_hz)),
         ("seed".to_string(), outcome.seed.to_string()),
         ("version".to_string(), format!("kfdesign {}", env!("CARGO_PKG_VERSION"))),
     ];

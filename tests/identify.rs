@@ -479,9 +479,9 @@ fn three_axis_log(bench: &Bench) -> Vec<Vec<f64>> {
         })
         .collect();
     let mut text = String::from("gyro_x (deg/s),gyro_y (deg/s),gyro_z (deg/s)\n");
-    for k in 0..3000 {
-        let y = if k == 1000 { "nan".to_string() } else { axes[1][k].to_string() };
-        text += &format!("{},{y},{}\n", axes[0][k], axes[2][k]);
+    for (k, ((x, y), z)) in axes[0].iter().zip(&axes[1]).zip(&axes[2]).enumerate() {
+        let y = if k == 1000 { f64::NAN } else { *y };
+        text += &format!("{x},{y},{z}\n");
     }
     bench.file("log.csv", text);
     axes.iter().map(|axis| axis.iter().map(|x| unit.to_si(*x)).collect()).collect()

@@ -135,7 +135,7 @@ impl LowFrequency {
         self.kept.push(y);
     }
 
-    /// The lengths that have enough blocks, shortest first. `variance` is E[y²] under the model: 1, or less behind a gate.
+    /// The lengths that have enough blocks, shortest first. `variance` is the mean of y² under the model: 1, or less behind a gate.
     pub fn results(&self, variance: f64, alpha: f64) -> Vec<BlockResult> {
         self.blocks
             .iter()

@@ -77,7 +77,7 @@ pub fn effective_samples(n: u64, rho: f64) -> f64 {
 
 /// Mean and variance of y² for y ~ N(0, 1) truncated to |y| ≤ g: what the NIS of accepted innovations has behind a gate of g sigmas.
 ///
-/// E[y²] = 1 − 2gφ(g)/p and E[y⁴] = 3 − 2(g³ + 3g)φ(g)/p with p = P(|y| ≤ g).
+/// E(y²) = 1 − 2gφ(g)/p and E(y⁴) = 3 − 2(g³ + 3g)φ(g)/p with p = P(|y| ≤ g).
 pub fn gated_moments(gate: f64) -> (f64, f64) {
     let inside = 2.0 * normal_cdf(gate) - 1.0;
     let density = (-0.5 * gate * gate).exp() / std::f64::consts::TAU.sqrt();

@@ -2,7 +2,7 @@
 //!
 //! Rules. A parameter is identified when the upper end of its 95 % interval is at most ten times the lower end; its
 //! interval is exp(ln θ ± 1.96 s), s from the fit, widened by √(χ²/dof) when the model does not explain the curve. The model is the
-//! one of the lowest score (see [`super::selection`]) whose parameters are all identified. Interval widths shrink as
+//! one of the lowest score (see `selection`) whose parameters are all identified. Interval widths shrink as
 //! T^(−1/2) with the length T of the log (Cramér-Rao): from that the log length that would tell.
 
 use super::points::Points;

@@ -2,7 +2,7 @@
 //! All take fractional degrees of freedom where that makes sense and are total: bad arguments give NaN, never a panic.
 //!
 //! Incomplete gamma functions and starting quantiles come from `statrs`; where its rounding grows with the degrees of
-//! freedom (above [`LARGE_DOF`]) Temme's uniform expansion replaces it. Checked against mpmath to 1e-9 relative in both tails.
+//! freedom (above `LARGE_DOF`) Temme's uniform expansion replaces it. Checked against mpmath to 1e-9 relative in both tails.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 use statrs::function::gamma::{checked_gamma_lr, checked_gamma_ur};

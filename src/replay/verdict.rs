@@ -4,7 +4,7 @@
 //! autocorrelation of lags 1–50), `ljung_box` (all these lags together), `low_frequency` (innovations averaged over a quarter to
 //! sixteen times the filter's time constant; see [`crate::consistency::low_frequency`]), `cumulative_periodogram` (shape of their
 //! low-frequency spectrum) and, behind a gate, `rejected`. Holm's adjustment runs over all tests and axes;
-//! [`effect::judge`](crate::consistency::effect::judge) states how p-values and effect sizes make the verdict.
+//! [`effect::judge`] states how p-values and effect sizes make the verdict.
 
 use super::{
     AxisReplay, AxisResult, FinalState, LowFrequencySummary, Nis, ReplayResult, Replayer, Sight, Start,

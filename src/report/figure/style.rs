@@ -115,7 +115,7 @@ fn rules(theme: &Theme, series: &[&str; SERIES]) -> String {
     css
 }
 
-/// The style sheet that every figure carries. Lengths are in figure units ([`UNITS`] to the pixel).
+/// The style sheet that every figure carries. Lengths are in figure units (`UNITS` to the pixel).
 pub fn style_sheet() -> String {
     let class = |class: Class| format!(".kf{}", class.code());
     let mut css = String::from(".kf text{font-family:\"Helvetica Neue\",Arial,sans-serif;stroke:none}");

@@ -421,8 +421,8 @@ fn short_or_empty_logs_are_inconclusive() {
         assert!(!serde_json::to_string(&result).unwrap().contains("NaN"));
     }
     let minute = replay(&right, &draw(&right, 4, 6000), Options::default());
-    // 30 blocks of the filter's time constant, 19.62 s, rounded to four quarters of 4.91 s
-    assert!(minute.meaning.contains("589.2 s"), "{}", minute.meaning);
+    // thirty times 1/K = 2183.507 samples (formulas: K = 4.579788053e-4)
+    assert!(minute.meaning.contains("655.1 s"), "{}", minute.meaning);
     // a minute is enough to see a wrong white noise, though not the drift
     let loud = replay(&skydog(0.01, 1.5, 1.0, 1.0), &draw(&right, 4, 6000), Options::default());
     assert_eq!(loud.verdict, Verdict::Inconsistent);
@@ -438,6 +438,7 @@ fn axes_are_matched_by_name_letter_or_order() {
     assert_eq!(matched(&["gyro_x", "gyro_y", "gyro_z"]).unwrap(), "gyro_x gyro_y gyro_z");
     assert_eq!(matched(&["gyr_z_dps", "gyr_y_dps", "gyr_x_dps", "temp"]).unwrap(), "gyr_x_dps gyr_y_dps gyr_z_dps");
     assert_eq!(matched(&["GyroX", "GyroY", "GyroZ"]).unwrap(), "GyroX GyroY GyroZ");
+    assert_eq!(matched(&["box_z", "box_y", "box_x"]).unwrap(), "box_x box_y box_z");
     assert_eq!(matched(&["1", "2", "3"]).unwrap(), "1 2 3");
     for unclear in [&["x", "y"][..], &["a", "b", "c", "d"], &["z", "a", "b"]] {
         let error = matched(unclear).unwrap_err();

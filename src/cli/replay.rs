@@ -178,7 +178,7 @@ fn columns(estimates: &Estimates, innovations: bool) -> Vec<&[f64]> {
 
 const COUNTS: [&str; 9] =
     ["axis", "log column", "samples", "accepted", "gaps", "missing", "unusable", "rejected", "log-likelihood"];
-const STATES: [&str; 5] = ["axis", "state", "estimate", "sigma", "unit"];
+const STATES: [&str; 5] = ["axis", "of", "estimate", "sigma", "unit"];
 const TESTS: [&str; 10] =
     ["axis", "test", "statistic", "lower", "upper", "p", "effect", "interval", "tolerated", "result"];
 
@@ -221,10 +221,12 @@ fn test_rows(result: &ReplayResult) -> Vec<Vec<String>> {
     result.tests.iter().map(|t| test_row(t, result.alpha)).collect()
 }
 
+/// The whole estimate of each axis, and its states where they are few; all are in the JSON document.
 fn state_rows(result: &ReplayResult, unit: Option<&Unit>) -> Vec<Vec<String>> {
     let mut rows = Vec::new();
     for axis in &result.axes {
-        for state in &axis.final_state {
+        let few = if axis.final_state.len() <= 3 { axis.final_state.as_slice() } else { &[] };
+        for state in std::iter::once(&axis.final_output).chain(few) {
             let (value, sigma, shown) = in_log_unit(state.value, state.sigma, &state.unit, result.quantity, unit);
             rows.push(vec![axis.name.clone(), state.name.clone(), digits(value), digits(sigma), shown]);
         }

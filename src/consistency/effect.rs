@@ -13,8 +13,7 @@ use super::{Test, Verdict, multiplicity};
 pub const NIS_TOLERANCE: f64 = 0.10;
 /// Largest |autocorrelation| of the innovations that is tolerated: one lag of 0.1 predicts 1 % of the innovation variance.
 pub const AUTOCORRELATION_TOLERANCE: f64 = 0.1;
-/// Sum of squared autocorrelations that is tolerated: the share of the innovation variance that a better model could predict,
-/// to first order.
+/// Share of the innovation variance that its own past predicts and that is tolerated: what a better model could gain.
 pub const PREDICTABLE_TOLERANCE: f64 = 0.03;
 /// Low-frequency variance ratio that is tolerated, either way: about 14 % in the size of the drift.
 pub const VARIANCE_RATIO_TOLERANCE: f64 = 1.3;

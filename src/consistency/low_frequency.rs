@@ -15,8 +15,8 @@ use crate::units::digits;
 
 /// Below this number of blocks a length is not judged.
 pub const FEWEST_BLOCKS: u64 = 8;
-/// Blocks of one filter time constant that a log must have before its drift is judged at all.
-pub const ENOUGH_BLOCKS: u64 = 30;
+/// Filter time constants that a log must have before its drift is judged at all.
+pub const ENOUGH_TIME_CONSTANTS: f64 = 30.0;
 /// At most this many block lengths, each four times the one before.
 const MOST_LENGTHS: usize = 8;
 /// Block means kept for the periodogram; when full, neighbours are merged and the blocks are twice as long.
@@ -98,15 +98,24 @@ impl Kept {
 pub struct LowFrequency {
     blocks: Vec<Blocks>,
     kept: Kept,
+    count: u64,
+    enough: u64,
 }
 
 impl LowFrequency {
-    /// For a filter with these closed-loop time constants, in samples; see [`block_lengths`].
-    pub fn new(time_constants: &[f64]) -> LowFrequency {
-        LowFrequency::with_lengths(&block_lengths(time_constants))
+    /// For a filter with these closed-loop time constants, in samples; see [`block_lengths`]. `gain` is that of the steady
+    /// filter from innovation to predicted measurement, H K: a filter averages over about 1/(H K) samples, whatever the number of
+    /// its states, and a log of [`ENOUGH_TIME_CONSTANTS`] times that is enough for a judgement. A filter without gain follows no
+    /// drift; for it the block lengths decide.
+    pub fn new(time_constants: &[f64], gain: f64) -> LowFrequency {
+        let mut low_frequency = LowFrequency::with_lengths(&block_lengths(time_constants));
+        if gain > 1e-12 {
+            low_frequency.enough = (ENOUGH_TIME_CONSTANTS / gain).ceil() as u64;
+        }
+        low_frequency
     }
 
-    /// With block lengths in samples, shortest first.
+    /// With block lengths in samples, shortest first; enough are 120 of the shortest.
     pub fn with_lengths(lengths: &[u64]) -> LowFrequency {
         let blocks = lengths.iter().map(|&length| Blocks { length, filled: 0, sum: 0.0, count: 0, squares: 0.0 });
         LowFrequency {
@@ -117,6 +126,8 @@ impl LowFrequency {
                 sum: 0.0,
                 values: Vec::with_capacity(KEPT_BLOCKS),
             },
+            count: 0,
+            enough: lengths.first().map_or(0, |length| length.saturating_mul(120)),
         }
     }
 
@@ -133,6 +144,7 @@ impl LowFrequency {
             }
         }
         self.kept.push(y);
+        self.count += 1;
     }
 
     /// The lengths that have enough blocks, shortest first. `variance` is the mean of y² under the model: 1, or less behind a gate.
@@ -149,15 +161,14 @@ impl LowFrequency {
         cumulative_periodogram(&self.kept.values, alpha).map(|p| (self.kept.length, p))
     }
 
-    /// Whether the log has enough blocks of one (the shortest) filter time constant for its drift to be judged.
+    /// Whether the log is long enough for its drift to be judged.
     pub fn is_enough(&self) -> bool {
-        // the first length is a quarter of a time constant
-        self.blocks.first().is_some_and(|b| b.count >= 4 * ENOUGH_BLOCKS)
+        self.count >= self.enough
     }
 
     /// Innovations that [`LowFrequency::is_enough`] asks for.
     pub fn samples_needed(&self) -> u64 {
-        self.blocks.first().map_or(0, |b| b.length.saturating_mul(4 * ENOUGH_BLOCKS))
+        self.enough
     }
 }
 

@@ -251,16 +251,20 @@ impl Whiteness {
         [largest, together]
     }
 
-    /// Σ ρ_h² over the lags with its interval: the share of the innovation variance that its own past predicts, to first order.
+    /// Share of the innovation variance that its own past predicts, s/(1 + s) with s = Σ ρ_h² over the lags, and its interval.
     ///
-    /// Q is noncentral χ²(lags, n Σρ²); √Q is close to N(√(lags − ½ + nΣρ²), 1) (Fisher 1928, extended).
+    /// Exact for a first-order autoregression, of first order in s otherwise. Q is noncentral χ²(lags, n·s), and √Q is close to
+    /// N(√(lags − ½ + n·s), 1) (Fisher 1928, extended).
     fn predictable_share(&self, alpha: f64) -> (f64, [f64; 2]) {
         let n = self.samples as f64;
-        let base = self.lags as f64 - 0.5;
         let root = self.ljung_box.sqrt();
         let z = normal_quantile(1.0 - alpha / 2.0);
-        let share = |r: f64| ((r.max(0.0).powi(2) - base) / n).max(0.0);
-        (((self.ljung_box - self.lags as f64) / n).max(0.0), [share(root - z), share(root + z)])
+        let share = |excess: f64| {
+            let sum = (excess / n).max(0.0);
+            sum / (1.0 + sum)
+        };
+        let at = |r: f64| share(r.max(0.0).powi(2) - (self.lags as f64 - 0.5));
+        (share(self.ljung_box - self.lags as f64), [at(root - z), at(root + z)])
     }
 }
 

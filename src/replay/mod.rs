@@ -191,6 +191,8 @@ pub struct AxisResult {
     pub rejected: u64,
     /// Σ −½(ln 2πS + ν²/S) over every accepted sample.
     pub log_likelihood: f64,
+    /// H x at the end of the log: what the filter expects a sensor at rest to show.
+    pub final_output: FinalState,
     pub final_state: Vec<FinalState>,
     /// Absent when too few samples were accepted.
     pub nis: Option<Nis>,
@@ -336,6 +338,7 @@ impl AxisReplay {
     fn new(design: &AxisDesign, gate: Option<f64>) -> AxisReplay {
         let model = &design.model;
         let settling = design.steady_state.settling_time / model.dt;
+        let gain = (model.h.row(0) * design.steady_state.gain.column(0))[0];
         AxisReplay {
             kalman: Kalman::new(model),
             every: model.every.first().copied().unwrap_or(1).max(1) as u64,
@@ -345,7 +348,7 @@ impl AxisReplay {
             started: false,
             start: StartTest::new(model, settling),
             autocorrelation: Autocorrelation::new(LAGS),
-            low_frequency: LowFrequency::new(&time_constants(&design.steady_state.poles)),
+            low_frequency: LowFrequency::new(&time_constants(&design.steady_state.poles), gain),
             log_likelihood: Sum::default(),
             samples: 0,
             unusable: 0,

@@ -85,6 +85,7 @@ fn axis_result(axis: AxisReplay, design: &AxisDesign, log_axis: String, alpha: f
         missing: axis.missing,
         rejected: axis.rejected,
         log_likelihood: axis.log_likelihood.value(),
+        final_output: final_output(&axis, design),
         final_state: final_state(&axis, design),
         nis: None,
         whiteness: None,
@@ -159,6 +160,13 @@ fn thinned(values: &[f64]) -> impl Iterator<Item = (usize, f64)> + '_ {
     values.iter().copied().enumerate().step_by(step)
 }
 
+fn final_output(axis: &AxisReplay, design: &AxisDesign) -> FinalState {
+    let (value, sigma) = axis.output();
+    let measurement = design.model.measurements.first();
+    let (name, unit) = measurement.map(|m| (m.name.clone(), m.unit.clone())).unwrap_or_default();
+    FinalState { name, unit, value, sigma }
+}
+
 fn final_state(axis: &AxisReplay, design: &AxisDesign) -> Vec<FinalState> {
     let states = design.model.states.iter().enumerate();
     states
@@ -227,26 +235,50 @@ fn rejected_test(axis: &str, gate: f64, rejected: u64, accepted: u64, alpha: f64
     )
 }
 
-/// The verdict in one or two sentences.
+/// The verdict in a few sentences, axis by axis.
 fn meaning(verdict: Verdict, alpha: f64, tests: &[Test], axes: &[AxisResult], short: &[String]) -> String {
-    let tell =
-        |chosen: Vec<&Test>| chosen.iter().map(|t| format!("{}: {}", t.axis, t.meaning)).collect::<Vec<_>>().join("; ");
+    let tell = |chosen: &dyn Fn(&Test) -> bool| {
+        let said = axes.iter().filter_map(|axis| {
+            let own = || tests.iter().filter(|t| t.axis == axis.name);
+            let sentences: Vec<&str> = own().filter(|t| chosen(t)).map(|t| t.meaning.as_str()).collect();
+            let drift = (!sentences.is_empty() && drift_holds(axis, own())).then(|| slow_part(axis));
+            (!sentences.is_empty())
+                .then(|| format!("{}: {}{}", axis.name, sentences.join("; "), drift.unwrap_or_default()))
+        });
+        said.collect::<Vec<_>>().join(". ")
+    };
     match verdict {
-        Verdict::Inconsistent => tell(tests.iter().filter(|t| !t.pass).collect()),
+        Verdict::Inconsistent => tell(&|t| !t.pass),
         Verdict::Inconclusive if !short.is_empty() => short.join("; "),
         Verdict::Inconclusive => format!(
             "deviations are real but the log is too short to tell whether they matter: {}",
-            tell(tests.iter().filter(|t| effect::is_undecided(t, alpha)).collect())
+            tell(&|t| effect::is_undecided(t, alpha))
         ),
         Verdict::Consistent => {
-            let longest =
-                axes.iter().filter_map(|a| a.low_frequency.last().map(|l| l.block_s)).fold(f64::INFINITY, f64::min);
-            let drift = if longest.is_finite() {
-                format!(", and their slow part is as predicted up to averages of {} s", digits(longest))
-            } else {
-                String::new()
+            let shortest =
+                axes.iter().filter(|a| !a.low_frequency.is_empty()).min_by(|a, b| longest(a).total_cmp(&longest(b)));
+            let small = tests.iter().filter(|t| t.adjusted_p_value < alpha).count();
+            let deviations = match small {
+                0 => "the innovations are white and as large as the filter says".to_string(),
+                1 => "one deviation is significant but small, within what is tolerated".to_string(),
+                n => format!("{n} deviations are significant but small, within what is tolerated"),
             };
-            format!("the innovations are white and as large as the filter says{drift}")
+            format!("{deviations}{}", shortest.map(slow_part).unwrap_or_default())
         }
     }
+}
+
+/// The longest averages that were judged, s.
+fn longest(axis: &AxisResult) -> f64 {
+    axis.low_frequency.last().map_or(0.0, |l| l.block_s)
+}
+
+/// The low-frequency tests were made and none of them failed.
+fn drift_holds<'a>(axis: &AxisResult, mut tests: impl Iterator<Item = &'a Test>) -> bool {
+    !axis.low_frequency.is_empty()
+        && tests.all(|t| t.pass || !matches!(t.name.as_str(), "low_frequency" | "cumulative_periodogram" | "start"))
+}
+
+fn slow_part(axis: &AxisResult) -> String {
+    format!("; the drift is as predicted, up to averages of {} s", digits(longest(axis)))
 }

@@ -1,6 +1,7 @@
 //! Linear algebra, matrix equations, distributions, random streams and ordered sums (floor 0).
 
 pub mod distribution;
+pub mod exact_sum;
 pub mod linalg;
 pub mod random;
 pub mod reduce;

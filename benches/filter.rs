@@ -1,11 +1,14 @@
 //! One predict and update of the reference sensor's filter, ours (sizes known at run time, innovation statistics and gate included)
-//! against the same equations written by hand with statically sized nalgebra matrices on the same data.
+//! against the same equations written by hand with statically sized nalgebra matrices on the same data; and the exact expectation of
+//! a mismatched filter.
 
 use std::hint::black_box;
 use std::time::Instant;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use kfdesign::filter::Kalman;
+use kfdesign::filter::gains::GainSequence;
+use kfdesign::filter::mismatch::expect;
+use kfdesign::filter::{Judge, Kalman};
 use kfdesign::model::{InitialBias, LinearModel, Plant, augment};
 use kfdesign::noise::{NoiseModel, Term};
 use kfdesign::numerics::random::{StreamId, fill_normal, stream};
@@ -112,5 +115,24 @@ fn gap(criterion: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, compare::<2>, compare::<3>, gap);
+/// What the two-state filter does under three truths, four block lengths, 600 s at 100 Hz.
+fn expectation(criterion: &mut Criterion) {
+    let (filter, steps) = (model(1), 60_000);
+    let gains = GainSequence::new(&filter, steps, &[0, 99, 9999, steps - 1]);
+    let mut louder = filter.clone();
+    louder.q *= 4.0;
+    let mut slower = filter.clone();
+    slower.f[(1, 1)] = (-0.01_f64 / 400.0).exp();
+    let blocks = [vec![4, 64, 1024, 2000]];
+    let mut group = criterion.benchmark_group("expectation under a truth, 2 states, 60 000 steps");
+    group.throughput(Throughput::Elements(steps)).sample_size(20);
+    for (name, truth) in [("another Q", louder), ("another Tc", slower), ("a drift more", model(2))] {
+        let judge = Judge::new(&filter, &truth, &gains.epochs);
+        group.bench_function(name, |bench| bench.iter(|| expect(&filter, black_box(&truth), &gains, &judge, &blocks)));
+    }
+    group.bench_function("the gains", |bench| bench.iter(|| GainSequence::new(black_box(&filter), steps, &[0])));
+    group.finish();
+}
+
+criterion_group!(benches, compare::<2>, compare::<3>, gap, expectation);
 criterion_main!(benches);

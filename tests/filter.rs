@@ -2,6 +2,7 @@
 
 mod document;
 mod kalman;
+mod mismatch;
 mod steady_state;
 
 use kfdesign::model::{LinearModel, Named};

@@ -1,9 +1,25 @@
 //! Kalman filter (Joseph form), square root, steady state, the filter.json document, the run record (floor 3).
 
+/// Calls a kernel with its size known to the compiler for the sizes that occur most, so that the loops unroll.
+macro_rules! for_size {
+    ($n:expr, $kernel:ident($($argument:expr),*)) => {
+        match $n {
+            1 => $kernel(1, $($argument),*),
+            2 => $kernel(2, $($argument),*),
+            3 => $kernel(3, $($argument),*),
+            4 => $kernel(4, $($argument),*),
+            5 => $kernel(5, $($argument),*),
+            6 => $kernel(6, $($argument),*),
+            n => $kernel(n, $($argument),*),
+        }
+    };
+}
+
 pub mod document;
 pub mod gains;
 pub mod judge;
 pub mod kalman;
+pub mod mismatch;
 mod reading;
 mod rows;
 pub mod steady_state;

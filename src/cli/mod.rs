@@ -6,8 +6,10 @@
 
 pub mod allan;
 mod allan_figure;
+mod flags;
 pub mod identify;
 pub mod log_flags;
+pub mod montecarlo;
 pub mod output;
 pub mod replay;
 pub mod schema;
@@ -48,6 +50,8 @@ enum Command {
     Simulate(simulate::Args),
     Tune(tune::Args),
     Replay(replay::Args),
+    Montecarlo(montecarlo::Args),
+    Merge(montecarlo::MergeArgs),
     Schema(schema::Args),
 }
 
@@ -71,6 +75,8 @@ pub fn main() -> ExitCode {
         Command::Simulate(args) => simulate::run(&args),
         Command::Tune(args) => tune::run(&args),
         Command::Replay(args) => replay::run(&args),
+        Command::Montecarlo(args) => montecarlo::run(&args),
+        Command::Merge(args) => montecarlo::merge(&args),
         Command::Schema(args) => schema::run(&args),
     };
     match result {

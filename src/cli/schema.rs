@@ -4,6 +4,7 @@ use clap::ValueEnum;
 
 use super::{Status, output};
 use crate::filter::FilterDesign;
+use crate::montecarlo;
 use crate::params::Params;
 use crate::replay::ReplayResult;
 
@@ -24,12 +25,15 @@ enum Document {
     Filter,
     /// What `replay --json` prints
     Replay,
+    /// What `montecarlo` and `merge` write
+    Montecarlo,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     output::print_json(&match args.document {
         Document::Params => Params::schema(),
         Document::Filter => FilterDesign::schema(),
+        Document::Montecarlo => montecarlo::document::schema(),
         Document::Replay => schemars::schema_for!(ReplayResult).to_value(),
     })?;
     Ok(Status::Done)

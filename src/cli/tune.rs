@@ -87,7 +87,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let verification = verify(&tuned.design, &plan, &|runs| bar.inc(runs))?;
     bar.finish_and_clear();
     if let Some(record) = tuned.design.tuning.as_object_mut() {
-        record.insert("verification".into(), json!(verification));
+        let summary = json!({
+            "verdict": verification.verdict, "alpha": verification.alpha, "runs": verification.runs.count(),
+            "steps": verification.steps, "seed": verification.seed, "tests": verification.tests,
+        });
+        record.insert("verification".into(), summary);
     }
     let verified = verification.verdict == Verdict::Consistent;
     if let (Some(output), true) = (&args.output, verified) {

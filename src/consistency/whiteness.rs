@@ -332,7 +332,7 @@ pub fn cumulative_periodogram(series: &[f64], alpha: f64) -> Option<CumulativePe
 }
 
 /// x with `kolmogorov_sf`(x) = p, by bisection.
-fn kolmogorov_quantile(p: f64) -> f64 {
+pub fn kolmogorov_quantile(p: f64) -> f64 {
     let (mut low, mut high) = (0.1, 10.0);
     for _ in 0..60 {
         let middle = 0.5 * (low + high);

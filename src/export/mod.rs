@@ -1,4 +1,5 @@
-//! Getting results out (floor 6): tables as csv, csv.gz and npy, written atomically.
+//! Getting results out (floor 6): tables as csv, csv.gz and npy, test reports, written atomically.
 
 pub mod atomic;
+pub mod junit;
 pub mod table;

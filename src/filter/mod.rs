@@ -21,7 +21,7 @@ pub mod judge;
 pub mod kalman;
 pub mod mismatch;
 mod reading;
-mod rows;
+pub(crate) mod rows;
 pub mod steady_state;
 
 pub use document::{AxisDesign, FilterDesign, FilterError};

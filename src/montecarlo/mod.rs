@@ -1,89 +1,93 @@
-//! Many simulated runs through a design (floor 5): the quick verification that tune makes; the full gate comes later.
+//! Many simulated runs through a design: does its covariance tell the truth? (floor 5)
 //!
-//! The truth is a linear model, by default the design's own: x0 ~ N(x0, P0), exact process and measurement noise. The filter's covariances do not
-//! depend on the data, so they are computed once and many runs go through the gains. Every random number is addressed by (seed, run, axis).
+//! An [`Experiment`] is design, truth, length, seed and level. Its [`Course`] holds what no random number changes (gains, epochs, block lengths);
+//! the engine adds up what the gate looks at over any range of runs, exactly; `conclusion` makes tests of the sums; `gate` and
+//! `law` know how these tests behave together for a true filter, so that the verdict has the false-alarm probability it states.
+//!
+//! The truth is a linear model: x(0) ~ N(x0, P0), exact process and measurement noise. Every random number is addressed by (seed, run, axis,
+//! source).
 
-mod engine;
-mod summary;
+pub mod calibration;
+mod conclusion;
+pub mod course;
+mod credibility;
+pub mod document;
+pub mod engine;
+pub mod experiment;
+pub mod gate;
+mod lanes;
+mod law;
+pub mod outcome;
+mod sentences;
+mod spread;
+pub mod sums;
 
-use schemars::JsonSchema;
-use serde::Serialize;
+use std::ops::Range;
 
-use crate::consistency::{Test, Verdict, multiplicity};
+pub use engine::{Course, Trace};
+pub use experiment::Experiment;
+pub use outcome::{AxisOutcome, Outcome, Runs};
+pub use sums::Totals;
+
+use crate::consistency::Verdict;
 use crate::filter::FilterDesign;
 use crate::numerics::linalg::LinalgError;
+use crate::tune::TuneError;
+use gate::Gate;
 
-/// Size of a verification.
+/// Replicates that set the critical value of the quick verification.
+const QUICK_REPLICATES: u64 = 4_000;
+
+/// Size of a quick verification.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
     pub runs: u64,
     /// Samples per run.
     pub steps: u64,
     pub seed: u64,
-    /// Probability that a true design is called inconsistent, at most (all tests and axes together).
+    /// Probability that a true design is called inconsistent (all tests and axes together).
     pub alpha: f64,
 }
 
 impl Plan {
-    /// 100 runs of 600 s (at least 2000, at most 60 000 samples), seed 1, false alarm at most 1e-3.
+    /// 100 runs of 600 s (at least 2000, at most 60 000 samples), seed 1, false alarm 1e-3.
     pub fn quick(sample_rate_hz: f64) -> Plan {
         let steps = (600.0 * sample_rate_hz).round().clamp(2000.0, 60_000.0);
         Plan { runs: 100, steps: steps as u64, seed: 1, alpha: 1e-3 }
     }
 }
 
-/// Estimation errors of all runs at one time.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Epoch {
-    /// s from the first measurement.
-    pub time_s: f64,
-    /// Mean NEES over the runs, divided by the number of states: 1 when the covariance is right.
-    pub anees: f64,
-    /// `anees` lies in [lower, upper] with probability 1 − alpha when the design is true.
-    pub lower: f64,
-    pub upper: f64,
-}
-
-/// One axis of [`Outcome`].
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct AxisOutcome {
-    pub name: String,
-    pub epochs: Vec<Epoch>,
-    /// Mean NIS over all runs and steps.
-    pub nis: f64,
-}
-
-/// What the runs say.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Outcome {
-    pub verdict: Verdict,
-    /// Bound of the false-alarm probability of the verdict.
-    pub alpha: f64,
-    pub runs: u64,
-    pub steps: u64,
-    pub seed: u64,
-    pub axes: Vec<AxisOutcome>,
-    pub tests: Vec<Test>,
-}
-
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MonteCarloError {
     #[error("{name} is {value}, expected {expected}")]
-    Plan { name: &'static str, value: f64, expected: &'static str },
+    Plan { name: &'static str, value: f64, expected: String },
+    #[error(
+        "a run of {duration_s} s is shorter than the settling time of axis '{axis}', {settling_s:.4} s: nothing but the start would be judged; \
+         make the duration longer"
+    )]
+    Settling { axis: String, duration_s: f64, settling_s: f64 },
     #[error("axis '{axis}': {what} of the truth: {source}")]
     Truth { axis: String, what: &'static str, source: LinalgError },
+    #[error("the truth: {source}")]
+    Parameters { source: TuneError },
     #[error("axis '{axis}': the truth has {truth}, the filter {filter}")]
     Mismatch { axis: String, truth: String, filter: String },
-    #[error("axis '{axis}' has {count} measurements; one is handled")]
-    Measurements { axis: String, count: usize },
+    #[error("the truth has the axes {truth}, the filter {filter}; expected the same names")]
+    Axes { truth: String, filter: String },
+    #[error("the truth is {truth}, the filter {filter}")]
+    Quantity { truth: &'static str, filter: &'static str },
+    #[error(
+        "axis '{axis}': no parameter has an interval to draw from; give them in the truth's parameters (\"interval\": [lower, upper]), as identify does"
+    )]
+    NoIntervals { axis: String },
+    #[error("{path}: {key}: {message}")]
+    Document { path: String, key: String, message: String },
 }
 
 /// Runs the design on its own model: is its covariance what its errors are?
 ///
-/// Tests per axis: NEES over the runs at five times (never summed over one run), the mean error at the first and the last, mean NIS,
-/// correlation of neighbouring innovations, and their low-frequency power. Holm's adjustment over all tests and axes keeps the
-/// false-alarm probability of the verdict at or below `plan.alpha`. `progress` is called with the number of runs just finished (all axes).
-/// Same design, plan and version: same outcome for any number of threads.
+/// The tests are those of the gate ([`gate::Kind`]); the family-wise false-alarm probability is `plan.alpha`.
+/// `progress` is called with the number of runs just finished (all axes). Same design, plan and version: same outcome for any number of threads.
 pub fn verify(design: &FilterDesign, plan: &Plan, progress: &(dyn Fn(u64) + Sync)) -> Result<Outcome, MonteCarloError> {
     verify_against(design, design, plan, progress)
 }
@@ -96,37 +100,43 @@ pub fn verify_against(
     plan: &Plan,
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<Outcome, MonteCarloError> {
-    check_plan(plan)?;
-    if design.axes.len() != truth.axes.len() || design.sample_rate_hz != truth.sample_rate_hz {
-        return Err(MonteCarloError::Mismatch {
-            axis: design.axes.first().map_or_else(String::new, |a| a.name.clone()),
-            truth: format!("{} axes at {} Hz", truth.axes.len(), truth.sample_rate_hz),
-            filter: format!("{} axes at {} Hz", design.axes.len(), design.sample_rate_hz),
-        });
+    experiment::check(plan.steps, plan.alpha)?;
+    if plan.runs < 2 {
+        return Err(MonteCarloError::Plan { name: "runs", value: plan.runs as f64, expected: "at least 2".into() });
     }
-    let mut tests = Vec::new();
-    let mut axes = Vec::new();
-    for (number, (filter, truth)) in design.axes.iter().zip(&truth.axes).enumerate() {
-        let axis = engine::Axis::new(filter, &truth.model, plan)?;
-        let sums = engine::run(&axis, number as u32, plan, progress);
-        let (outcome, its_tests) = summary::conclude(&filter.name, &axis, &sums, plan);
-        axes.push(outcome);
-        tests.extend(its_tests);
+    if design.axes.len() != truth.axes.len() {
+        let names = |d: &FilterDesign| d.axes.iter().map(|a| a.name.as_str()).collect::<Vec<_>>().join(", ");
+        return Err(MonteCarloError::Axes { truth: names(truth), filter: names(design) });
     }
-    let verdict = multiplicity::judge(&mut tests, plan.alpha);
-    Ok(Outcome { verdict, alpha: plan.alpha, runs: plan.runs, steps: plan.steps, seed: plan.seed, axes, tests })
+    let course = experiment::course_of(design, course::own_models(truth), plan.steps, plan.seed)?;
+    let totals = course.sums(0..plan.runs, progress);
+    let gate = calibration::gate(&course, plan.runs, plan.alpha, QUICK_REPLICATES);
+    Ok(conclude(&course, &totals, 0..plan.runs, &gate))
 }
 
-fn check_plan(plan: &Plan) -> Result<(), MonteCarloError> {
-    let wrong = |name, value, expected| Err(MonteCarloError::Plan { name, value, expected });
-    if plan.runs < 2 {
-        return wrong("runs", plan.runs as f64, "at least 2");
+/// Verdict on the sums of `runs`.
+pub fn conclude(course: &Course, totals: &[Totals], runs: Range<u64>, gate: &Gate) -> Outcome {
+    let count = runs.end - runs.start;
+    let (mut axes, mut tests) = (Vec::new(), Vec::new());
+    for (number, (axis, totals)) in course.axes.iter().zip(totals).enumerate() {
+        let (outcome, own) = conclusion::conclude(number, axis, totals, count, gate);
+        axes.push(outcome);
+        tests.extend(own);
     }
-    if !(16..=1_000_000).contains(&plan.steps) {
-        return wrong("steps", plan.steps as f64, "16 to 1 000 000");
-    }
-    if !(plan.alpha > 0.0 && plan.alpha < 1.0) {
-        return wrong("alpha", plan.alpha, "between 0 and 1");
-    }
-    Ok(())
+    let verdict = if tests.iter().all(|t| t.pass) { Verdict::Consistent } else { Verdict::Inconsistent };
+    let mut outcome = Outcome {
+        verdict,
+        meaning: String::new(),
+        alpha: gate.alpha,
+        runs: Runs { first: runs.start, end: runs.end },
+        steps: course.steps,
+        duration_s: course.steps as f64 * course.dt,
+        seed: course.seed,
+        critical_p_value: gate.critical,
+        false_alarm_rate: None,
+        tests,
+        axes,
+    };
+    outcome.meaning = sentences::verdict(&outcome);
+    outcome
 }

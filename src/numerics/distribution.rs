@@ -116,6 +116,11 @@ pub fn normal_quantile(p: f64) -> f64 {
     Normal::standard().inverse_cdf(p)
 }
 
+/// ψ(x), the derivative of ln Γ.
+pub fn digamma(x: f64) -> f64 {
+    statrs::function::gamma::digamma(x)
+}
+
 /// P(√n·D > x) in the limit: for Bartlett's cumulative periodogram test.
 /// 2 Σ (−1)^{k−1} e^{−2k²x²} for large x, 1 − (√(2π)/x) Σ e^{−(2k−1)²π²/(8x²)} for small. Source: Kolmogorov 1933.
 pub fn kolmogorov_sf(x: f64) -> f64 {

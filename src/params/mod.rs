@@ -90,9 +90,36 @@ impl AxisParams {
     pub fn noise(&self) -> NoiseModel {
         NoiseModel { terms: self.terms.iter().map(TermEntry::to_term).collect() }
     }
+
+    /// Every coefficient of the noise terms with its path in the document: `white.density`, `gauss_markov.std_dev`,
+    /// `gauss_markov[1].std_dev` for the second term of a kind.
+    pub fn noise_parameters(&mut self) -> impl Iterator<Item = (String, &mut Measured)> {
+        let mut seen: Vec<&'static str> = Vec::new();
+        self.terms.iter_mut().flat_map(move |term| {
+            let (kind, parameters) = term.parameters();
+            let before = seen.iter().filter(|k| **k == kind).count();
+            seen.push(kind);
+            let place = if before == 0 { kind.to_string() } else { format!("{kind}[{before}]") };
+            parameters.into_iter().map(move |(name, value)| (format!("{place}.{name}"), value))
+        })
+    }
 }
 
 impl TermEntry {
+    /// The term's key in the document and its coefficients by name.
+    fn parameters(&mut self) -> (&'static str, Vec<(&'static str, &mut Measured)>) {
+        match self {
+            TermEntry::Quantization { coefficient } => ("quantization", vec![("coefficient", coefficient)]),
+            TermEntry::White { density } => ("white", vec![("density", density)]),
+            TermEntry::BiasInstability { coefficient } => ("bias_instability", vec![("coefficient", coefficient)]),
+            TermEntry::GaussMarkov { std_dev, correlation_time } => {
+                ("gauss_markov", vec![("std_dev", std_dev), ("correlation_time", correlation_time)])
+            }
+            TermEntry::RateRandomWalk { density } => ("rate_random_walk", vec![("density", density)]),
+            TermEntry::RateRamp { slope } => ("rate_ramp", vec![("slope", slope)]),
+        }
+    }
+
     /// The term with SI coefficients.
     pub fn to_term(&self) -> Term {
         match self {

@@ -14,7 +14,7 @@ use serde_json::json;
 
 use crate::filter::steady_state::{SteadyStateError, steady_state};
 use crate::filter::{AxisDesign, FilterDesign};
-use crate::model::{ModelError, Plant};
+use crate::model::{LinearModel, ModelError, Plant};
 use crate::numerics::linalg::LinalgError;
 use crate::params::{AxisParams, Params};
 use crate::units::Quantity;
@@ -108,6 +108,16 @@ pub fn tune(params: &Params, options: &TuneOptions) -> Result<Tuned, TuneError> 
         }),
     };
     Ok(Tuned { design, reports })
+}
+
+/// The model of one axis that [`tune`] builds its filter on; `dt` in s.
+pub fn sensor_model(
+    axis: &AxisParams,
+    quantity: Quantity,
+    dt: f64,
+    options: &TuneOptions,
+) -> Result<LinearModel, TuneError> {
+    Ok(sensor::build(axis, quantity, dt, options)?.model)
 }
 
 fn tune_axis(

@@ -65,6 +65,13 @@ impl Quantity {
             Quantity::SpecificForce => Dimension::new(0, 2, -4),
         }
     }
+    /// The word in documents.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Quantity::AngularRate => "angular-rate",
+            Quantity::SpecificForce => "specific-force",
+        }
+    }
     /// "rad/s" or "m/s^2".
     pub const fn si_unit(self) -> &'static str {
         match self {

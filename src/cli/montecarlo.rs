@@ -1,0 +1,318 @@
+//! `kfdesign montecarlo` and `kfdesign merge`.
+
+mod text;
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, bail};
+
+use super::Status;
+use super::flags::with_unit;
+use super::output::{digits, print_text, progress};
+use crate::consistency::Verdict;
+use crate::export::{atomic, junit, table::TableWriter};
+use crate::filter::FilterDesign;
+use crate::montecarlo::calibration::{self, REPLICATES};
+use crate::montecarlo::document::{self, Shard};
+use crate::montecarlo::{Course, Experiment, Outcome, Runs, Totals, conclude};
+use crate::params::Params;
+use crate::units::Dimension;
+
+/// Time between two writes of unfinished work.
+const CHECKPOINT: Duration = Duration::from_secs(20);
+
+/// Many simulated runs through filter.json: does its covariance tell the truth?
+///
+/// The verdict is a gate for CI: exit status 0 consistent, 1 inconsistent. A true filter is called inconsistent with probability
+/// --alpha, all tests and axes together; that probability is measured and printed.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples: kfdesign montecarlo filter.json --runs 1000 --duration 600s\n          \
+kfdesign montecarlo filter.json --truth params.json --junit montecarlo.xml --report montecarlo.html\n          \
+kfdesign montecarlo filter.json --runs 0..500 -o a.json    (another machine: --runs 500..1000 -o b.json; then kfdesign merge a.json b.json)")]
+pub struct Args {
+    /// The design, as written by `tune`
+    filter: PathBuf,
+    /// Number of runs, or a range A..B of run numbers (B not included)
+    #[arg(long, default_value = "1000", value_name = "N|A..B", allow_hyphen_values = true)]
+    runs: String,
+    /// Length of a run, for example 600s or 2h
+    #[arg(long, default_value = "600s", value_name = "TIME", allow_hyphen_values = true)]
+    duration: String,
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    seed: u64,
+    /// Probability of a false alarm, over all tests and axes together
+    #[arg(long, default_value_t = 0.01, value_name = "P", allow_hyphen_values = true)]
+    alpha: f64,
+    /// Simulate these noise parameters instead of the design's own
+    #[arg(long, value_name = "params.json")]
+    truth: Option<PathBuf>,
+    /// Draw the parameters of every run from their intervals
+    #[arg(long)]
+    truth_spread: bool,
+    /// Measure the false-alarm probability with this many whole experiments, not from the law of the statistics
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    replicates: u64,
+    /// Simulate this run alone; -o takes its numbers (.csv, .csv.gz or .npy)
+    #[arg(long, value_name = "NUMBER", conflicts_with_all = ["runs", "resume", "json", "junit", "report"])]
+    run: Option<u64>,
+    /// Go on from what -o FILE holds of the same experiment
+    #[arg(long, requires = "output")]
+    resume: bool,
+    /// Threads; the results do not depend on it
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    #[command(flatten)]
+    outputs: Outputs,
+}
+
+/// One verdict from documents of `montecarlo`
+///
+/// The documents must be of one experiment and their runs must adjoin; the result is byte for byte that of all runs in one go. One document
+/// alone, also of interrupted work, is judged as it is.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example: kfdesign merge shard-*.json -o montecarlo.json")]
+pub struct MergeArgs {
+    /// Documents in any order
+    #[arg(required = true)]
+    shards: Vec<PathBuf>,
+    #[command(flatten)]
+    outputs: Outputs,
+}
+
+#[derive(Debug, clap::Args)]
+struct Outputs {
+    /// The document: verdict, curves and sums
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// The document on stdout
+    #[arg(long)]
+    json: bool,
+    /// Test report for CI servers
+    #[arg(long, value_name = "FILE.xml")]
+    junit: Option<PathBuf>,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
+    let inputs: Vec<&Path> = std::iter::once(args.filter.as_path()).chain(args.truth.as_deref()).collect();
+    args.outputs.check(&inputs)?;
+    let design = FilterDesign::read(&args.filter)?;
+    let truth = args.truth.as_deref().map(Params::read).transpose()?;
+    let duration_s = with_unit("--duration", &args.duration, Dimension::TIME, "600s")?;
+    let steps = (duration_s * design.sample_rate_hz).round();
+    if steps < 1.0 {
+        let rate = design.sample_rate_hz;
+        bail!("--duration {}: not one sample at {rate} Hz; expected a positive time, for example 600s", args.duration);
+    }
+    let experiment = Experiment {
+        design,
+        truth,
+        truth_spread: args.truth_spread,
+        steps: steps as u64,
+        seed: args.seed,
+        alpha: args.alpha,
+        replicates: args.replicates,
+    };
+    let threads = args.threads.unwrap_or(0);
+    if args.threads == Some(0) {
+        bail!("--threads 0: expected at least 1");
+    }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().context("--threads")?;
+    pool.install(|| {
+        let course = experiment.course().with_context(|| args.filter.display().to_string())?;
+        match args.run {
+            Some(number) => one_run(args, &experiment, &course, number),
+            None => many_runs(args, &experiment, &course),
+        }
+    })
+}
+
+/// `1000` or `500..1000`.
+fn range(text: &str) -> anyhow::Result<Range<u64>> {
+    let number = |text: &str| text.trim().parse::<u64>().ok();
+    let range = match text.split_once("..") {
+        None => number(text).map(|count| 0..count),
+        Some((first, end)) => number(first).zip(number(end)).map(|(first, end)| first..end),
+    };
+    match range {
+        Some(range) if range.start < range.end => Ok(range),
+        _ => bail!("--runs {text}: expected a number of runs of at least 1, or a range like 500..1000"),
+    }
+}
+
+fn many_runs(args: &Args, experiment: &Experiment, course: &Course) -> anyhow::Result<Status> {
+    let runs = range(&args.runs)?;
+    if runs.end - runs.start < 2 && !args.runs.contains("..") {
+        bail!("--runs {}: one run judges nothing; expected at least 2", args.runs);
+    }
+    let (start, mut next) = match args.outputs.output.as_deref().filter(|path| args.resume && path.exists()) {
+        None => (None, runs.start),
+        Some(path) => {
+            let shard = Shard::read(path)?;
+            shard.require(experiment, "this command")?;
+            if shard.runs.first != runs.start || shard.runs.end > runs.end {
+                let Runs { first, end } = shard.runs;
+                bail!(
+                    "{}: runs: holds {first}..{end}, which is no beginning of --runs {}; give another -o, or leave --resume out",
+                    path.display(),
+                    args.runs
+                );
+            }
+            (Some(shard.totals(course)?), shard.runs.end)
+        }
+    };
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked = Arc::clone(&stop);
+    ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed)).context("cannot watch for Ctrl-C")?;
+    let axes = course.axes.len() as u64;
+    let bar = progress((runs.end - runs.start) * axes, "runs");
+    bar.set_position((next - runs.start) * axes);
+    bar.reset_eta();
+    let mut saved = Instant::now();
+    let mut failure = None;
+    let partial = |totals: &[Totals], end: u64| {
+        let done = Runs { first: runs.start, end };
+        document::partial_json(experiment, course, done, totals)
+    };
+    let (totals, end) = course.sums_until(next..runs.end, start, &|count| bar.inc(count), &mut |totals, end| {
+        let stopping = stop.load(Ordering::Relaxed);
+        if let Some(path) = args.outputs.output.as_deref().filter(|_| stopping || saved.elapsed() > CHECKPOINT) {
+            failure = atomic::write(path, partial(totals, end).as_bytes()).err();
+            saved = Instant::now();
+        }
+        stopping || failure.is_some()
+    });
+    bar.finish_and_clear();
+    if let Some(failure) = failure {
+        return Err(failure.into());
+    }
+    next = end;
+    if next < runs.end {
+        let done = next - runs.start;
+        match &args.outputs.output {
+            Some(path) => bail!(
+                "interrupted after {done} of {} runs, which are in {}; the same command with --resume goes on",
+                runs.end - runs.start,
+                path.display()
+            ),
+            None => bail!("interrupted after {done} of {} runs; with -o FILE they would have been kept", runs.end - runs.start),
+        }
+    }
+    args.outputs.finish(experiment, course, &totals, runs)
+}
+
+pub(super) fn merge(args: &MergeArgs) -> anyhow::Result<Status> {
+    let inputs: Vec<&Path> = args.shards.iter().map(PathBuf::as_path).collect();
+    args.outputs.check(&inputs)?;
+    let shards = args.shards.iter().map(|path| Shard::read(path)).collect::<Result<Vec<_>, _>>()?;
+    let shards = document::in_order(shards)?;
+    let (Some(first), Some(last)) = (shards.first(), shards.last()) else { bail!("nothing to merge") };
+    let experiment = first.experiment.clone();
+    let course = experiment.course().with_context(|| first.path.clone())?;
+    let runs = first.runs.first..last.runs.end;
+    let mut totals = first.totals(&course)?;
+    for shard in &shards[1..] {
+        totals.iter_mut().zip(shard.totals(&course)?).for_each(|(sum, more)| sum.merge(&more));
+    }
+    args.outputs.finish(&experiment, &course, &totals, runs)
+}
+
+/// One run alone, as a table.
+fn one_run(args: &Args, experiment: &Experiment, course: &Course, number: u64) -> anyhow::Result<Status> {
+    let Some(path) = &args.outputs.output else { bail!("--run {number} needs -o FILE for its numbers (.csv, .csv.gz or .npy)") };
+    let traces = course.trace(number);
+    let time: Vec<f64> = (0..course.steps).map(|step| step as f64 * course.dt).collect();
+    let unit = experiment.design.quantity.si_unit();
+    let mut header = vec!["time (s)".to_string()];
+    let mut columns = vec![time.as_slice()];
+    for (axis, trace) in course.axes.iter().zip(&traces) {
+        let name = &axis.name;
+        for (states, kind, values) in
+            [(&axis.truth.states, "true", &trace.truth), (&axis.filter.states, "estimated", &trace.estimate)]
+        {
+            header.extend(states.iter().map(|s| format!("{name}_{}_{kind} ({})", s.name, s.unit)));
+            columns.extend(values.iter().map(Vec::as_slice));
+        }
+        for (i, channel) in axis.channels.iter().enumerate() {
+            let (place, own) = if axis.channels.len() == 1 {
+                (name.clone(), unit.to_string())
+            } else {
+                (format!("{name}_{}", channel.name), axis.filter.measurements[i].unit.clone())
+            };
+            let names = ["measured", "innovation"].map(|what| format!("{place}_{what} ({own})"));
+            header.extend(names.into_iter().chain([format!("{place}_innovation_normalised")]));
+            columns.extend([&trace.measured[i], &trace.innovation[i], &trace.normalised[i]].map(Vec::as_slice));
+        }
+    }
+    let mut writer = TableWriter::create(path, &header)?;
+    writer.write(&columns)?;
+    writer.finish()?;
+    if !args.outputs.json {
+        print_text(&format!(
+            "run {number} (seed {}): {} samples of {} s in {}\n",
+            course.seed,
+            course.steps,
+            digits(course.dt),
+            path.display()
+        ))?;
+    }
+    Ok(Status::Done)
+}
+
+impl Outputs {
+    /// No output is an input.
+    fn check(&self, inputs: &[&Path]) -> anyhow::Result<()> {
+        for output in [&self.output, &self.junit].into_iter().flatten() {
+            for input in inputs {
+                atomic::check_output(output, input)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The verdict on the sums, everywhere it was asked for.
+    fn finish(
+        &self,
+        experiment: &Experiment,
+        course: &Course,
+        totals: &[Totals],
+        runs: Range<u64>,
+    ) -> anyhow::Result<Status> {
+        let count = runs.end - runs.start;
+        let gate = calibration::gate(course, count, experiment.alpha, REPLICATES);
+        let mut outcome = conclude(course, totals, runs, &gate);
+        outcome.false_alarm_rate = Some(match experiment.replicates {
+            0 => calibration::false_alarms(course, &gate, count, REPLICATES),
+            replicates => {
+                let bar = progress(replicates * count * course.axes.len() as u64, "false alarms");
+                let own = experiment.own_course()?;
+                let rate = calibration::false_alarms_of_experiments(&own, &gate, count, replicates, &|n| bar.inc(n));
+                bar.finish_and_clear();
+                rate
+            }
+        });
+        let json = document::to_json(experiment, &outcome, totals);
+        if let Some(path) = &self.output {
+            atomic::write(path, json.as_bytes())?;
+        }
+        if let Some(path) = &self.junit {
+            atomic::write(path, junit::report(&outcome)?.as_bytes())?;
+        }
+        if self.json {
+            print_text(&json)?;
+        } else {
+            print_text(&text::outcome(&outcome))?;
+        }
+        Ok(status(&outcome))
+    }
+}
+
+fn status(outcome: &Outcome) -> Status {
+    match outcome.verdict {
+        Verdict::Inconsistent => Status::CheckFailed,
+        Verdict::Consistent | Verdict::Inconclusive => Status::Done,
+    }
+}

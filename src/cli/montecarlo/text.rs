@@ -1,0 +1,96 @@
+//! A Monte Carlo verdict as a person reads it.
+
+use crate::cli::output::{digits, table};
+use crate::montecarlo::calibration::{FalseAlarmRate, Method};
+use crate::montecarlo::{AxisOutcome, Outcome};
+
+pub(super) const TESTS: [&str; 9] =
+    ["axis", "test", "statistic", "lower", "upper", "p", "family-wise p", "result", "meaning"];
+pub(super) const AXES: [&str; 7] = ["axis", "NEES over time", "NIS", "NCI", "inclination", "within 1, 2, 3 sigma", "meaning"];
+
+pub(super) fn outcome(outcome: &Outcome) -> String {
+    let mut text = format!("{}\n\n", experiment(outcome));
+    text.push_str(&table(&AXES, &axis_rows(outcome)));
+    text.push_str(&format!("\nTests: bounds at {} %, each alone\n", digits(100.0 * (1.0 - outcome.alpha))));
+    text.push_str(&table(&TESTS, &test_rows(outcome)));
+    text.push('\n');
+    if let Some(rate) = &outcome.false_alarm_rate {
+        text.push_str(&format!("{}\n", false_alarms(outcome, rate)));
+    }
+    text.push_str(&format!("{}: {}\n", outcome.verdict.word(), outcome.meaning));
+    text
+}
+
+/// What was run.
+pub(super) fn experiment(outcome: &Outcome) -> String {
+    format!(
+        "{} runs ({}..{}) of {} s, {} samples each, seed {}",
+        outcome.runs.count(),
+        outcome.runs.first,
+        outcome.runs.end,
+        digits(outcome.duration_s),
+        outcome.steps,
+        outcome.seed
+    )
+}
+
+/// How often this gate is wrong about a true filter.
+pub(super) fn false_alarms(outcome: &Outcome, rate: &FalseAlarmRate) -> String {
+    let what = match rate.method {
+        Method::Law => "replicates drawn from the law of its statistics",
+        Method::Experiments => "whole experiments",
+    };
+    format!(
+        "False alarms of this gate: {} % measured ({} … {} %, {} {what}); {} % intended",
+        digits(100.0 * rate.value),
+        digits(100.0 * rate.interval[0]),
+        digits(100.0 * rate.interval[1]),
+        rate.replicates,
+        digits(100.0 * outcome.alpha)
+    )
+}
+
+pub(super) fn axis_rows(outcome: &Outcome) -> Vec<Vec<String>> {
+    let row = |axis: &AxisOutcome| {
+        let db = |value: f64| format!("{value:.2} dB");
+        let credibility = axis.credibility.as_ref();
+        let or_none = |text: Option<String>| text.unwrap_or_else(|| "-".into());
+        let nis: Vec<String> = axis.innovations.iter().map(|i| format!("{:.5}", i.nis)).collect();
+        vec![
+            axis.name.clone(),
+            format!("{:.4}", axis.nees_average.mean),
+            nis.join(", "),
+            or_none(credibility.map(|c| db(c.nci_db))),
+            or_none(credibility.map(|c| format!("{:+.2} dB", c.inclination_db))),
+            coverage(axis),
+            or_none(credibility.map(|c| c.meaning.clone())),
+        ]
+    };
+    outcome.axes.iter().map(row).collect()
+}
+
+/// Shares of all runs and times within 1, 2 and 3 predicted sigma, all components.
+fn coverage(axis: &AxisOutcome) -> String {
+    let mean = |of: &dyn Fn(&crate::montecarlo::outcome::Component) -> &[f64]| {
+        let all: Vec<f64> = axis.errors.iter().flat_map(|c| of(c).iter().copied()).collect();
+        format!("{:.2}", 100.0 * all.iter().sum::<f64>() / all.len() as f64)
+    };
+    format!("{}, {}, {} %", mean(&|c| &c.within_1_sigma), mean(&|c| &c.within_2_sigma), mean(&|c| &c.within_3_sigma))
+}
+
+pub(super) fn test_rows(outcome: &Outcome) -> Vec<Vec<String>> {
+    let row = |test: &crate::consistency::Test| {
+        vec![
+            test.axis.clone(),
+            test.name.clone(),
+            digits(test.statistic),
+            digits(test.lower),
+            digits(test.upper),
+            digits(test.p_value),
+            digits(test.adjusted_p_value),
+            if test.pass { "pass" } else { "FAIL" }.to_string(),
+            test.meaning.clone(),
+        ]
+    };
+    outcome.tests.iter().map(row).collect()
+}

@@ -1,0 +1,50 @@
+//! The test report that CI servers read.
+
+use quick_junit::{NonSuccessKind, Property, Report, TestCase, TestCaseStatus, TestSuite};
+
+use crate::consistency::Test;
+use crate::montecarlo::Outcome;
+
+/// The report could not be written as XML.
+#[derive(Debug, thiserror::Error)]
+#[error("JUnit report: {message}")]
+pub struct JunitError {
+    message: String,
+}
+
+/// One test suite per axis, one test case per test; the same outcome gives the same bytes.
+pub fn report(outcome: &Outcome) -> Result<String, JunitError> {
+    let mut report = Report::new("kfdesign montecarlo");
+    for axis in &outcome.axes {
+        let mut suite = TestSuite::new(format!("axis {}", axis.name));
+        for (name, value) in [
+            ("verdict", outcome.verdict.word().to_string()),
+            ("runs", format!("{}..{}", outcome.runs.first, outcome.runs.end)),
+            ("duration_s", outcome.duration_s.to_string()),
+            ("seed", outcome.seed.to_string()),
+            ("alpha", outcome.alpha.to_string()),
+        ] {
+            suite.add_property(Property::new(name, value));
+        }
+        suite.add_test_cases(outcome.tests.iter().filter(|t| t.axis == axis.name).map(case));
+        report.add_test_suite(suite);
+    }
+    report.to_string().map_err(|e| JunitError { message: e.to_string() })
+}
+
+fn case(test: &Test) -> TestCase {
+    let detail = format!(
+        "{}: statistic {}, expected {} to {}, p {}, family-wise p {}",
+        test.meaning, test.statistic, test.lower, test.upper, test.p_value, test.adjusted_p_value
+    );
+    let status = if test.pass {
+        TestCaseStatus::success()
+    } else {
+        let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
+        status.set_type("inconsistent").set_message(test.meaning.clone()).set_description(detail.clone());
+        status
+    };
+    let mut case = TestCase::new(test.name.clone(), status);
+    case.set_classname(format!("kfdesign.montecarlo.{}", test.axis)).set_system_out(detail);
+    case
+}

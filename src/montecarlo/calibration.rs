@@ -1,0 +1,135 @@
+//! Replicates of the gate: they set its critical value and, with other random numbers, measure its false-alarm probability.
+
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::conclusion;
+use super::engine::Course;
+use super::gate::{AxisGate, Gate, Kind, Raw};
+use super::law::Law;
+use crate::numerics::distribution::normal_quantile;
+
+/// Replicates drawn for the critical value.
+pub const REPLICATES: u64 = 20_000;
+/// First run number of the whole experiments that measure the false-alarm probability; they never share numbers with the experiment itself.
+const FIRST_RUN: u64 = 1 << 40;
+
+/// How often the gate rejects a true filter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FalseAlarmRate {
+    /// Share of the replicates that were called inconsistent.
+    pub value: f64,
+    /// 95 % interval of the probability (Wilson 1927).
+    pub interval: [f64; 2],
+    pub replicates: u64,
+    pub method: Method,
+    /// Each test alone at level alpha.
+    pub tests: Vec<TestRate>,
+}
+
+/// How replicates were made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// The statistics are drawn from their law for a true filter.
+    Law,
+    /// Every replicate is a whole experiment with the design as its own truth.
+    Experiments,
+}
+
+/// False alarms of one test.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TestRate {
+    pub axis: String,
+    pub name: String,
+    pub value: f64,
+}
+
+/// Interval of a probability after `hits` of `trials`: Wilson's score interval.
+pub fn wilson(hits: u64, trials: u64, confidence: f64) -> [f64; 2] {
+    let (n, z) = (trials as f64, normal_quantile(0.5 + 0.5 * confidence));
+    let p = hits as f64 / n;
+    let middle = p + z * z / (2.0 * n);
+    let half = z * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt();
+    let scale = 1.0 / (1.0 + z * z / n);
+    [((middle - half) * scale).max(0.0), ((middle + half) * scale).min(1.0)]
+}
+
+/// Raw p-values of `replicates` from the law, per axis.
+fn drawn(course: &Course, runs: u64, replicates: std::ops::Range<u64>) -> Vec<Vec<Vec<f64>>> {
+    let axis = |(number, axis): (u32, &super::course::AxisCourse)| {
+        let Some(law) = Law::new(axis, runs) else { return Vec::new() };
+        let raw = Raw::new(axis, runs);
+        replicates.clone().into_par_iter().map(|replicate| law.draw(&raw, course.seed, replicate, number)).collect()
+    };
+    (0..).zip(&course.axes).map(axis).collect()
+}
+
+/// The gate of `runs` runs at family-wise level `alpha`.
+pub fn gate(course: &Course, runs: u64, alpha: f64, replicates: u64) -> Gate {
+    let drawn = drawn(course, runs, 0..replicates);
+    let axes = course.axes.iter().zip(drawn).map(|(axis, raw)| AxisGate::new(Kind::of(axis), &raw)).collect();
+    Gate::new(axes, alpha)
+}
+
+/// False-alarm probability from replicates that the gate has not seen.
+pub fn false_alarms(course: &Course, gate: &Gate, runs: u64, replicates: u64) -> FalseAlarmRate {
+    let drawn = drawn(course, runs, replicates..2 * replicates);
+    let raw = |replicate: u64| drawn.iter().map(|axis| axis[replicate as usize].clone()).collect();
+    rate(course, gate, replicates, Method::Law, raw)
+}
+
+/// The same from whole experiments; `own` is the course whose truth is the design itself. `progress` counts runs of all axes.
+pub fn false_alarms_of_experiments(
+    own: &Course,
+    gate: &Gate,
+    runs: u64,
+    replicates: u64,
+    progress: &(dyn Fn(u64) + Sync),
+) -> FalseAlarmRate {
+    let raw = |replicate: u64| {
+        let first = FIRST_RUN + replicate * runs.next_multiple_of(4);
+        let totals = own.sums(first..first + runs, progress);
+        own.axes.iter().zip(&totals).map(|(axis, totals)| conclusion::raw_p_values(axis, totals, runs)).collect()
+    };
+    rate(own, gate, replicates, Method::Experiments, raw)
+}
+
+fn rate(
+    course: &Course,
+    gate: &Gate,
+    replicates: u64,
+    method: Method,
+    raw: impl Fn(u64) -> Vec<Vec<f64>>,
+) -> FalseAlarmRate {
+    let mut alone: Vec<Vec<u64>> = gate.axes.iter().map(|axis| vec![0; axis.kinds.len()]).collect();
+    let mut hits = 0;
+    for replicate in 0..replicates {
+        let mut failed = false;
+        for ((axis, raw), alone) in gate.axes.iter().zip(raw(replicate)).zip(&mut alone) {
+            for (p, count) in axis.p_values(&raw).into_iter().zip(alone) {
+                failed |= p <= gate.critical;
+                *count += u64::from(p <= gate.alpha);
+            }
+        }
+        hits += u64::from(failed);
+    }
+    let total = replicates.max(1);
+    let tests = course.axes.iter().zip(&gate.axes).zip(&alone).flat_map(|((axis, gate), alone)| {
+        gate.kinds.iter().zip(alone).map(|(kind, count)| TestRate {
+            axis: axis.name.clone(),
+            name: conclusion::test_name(axis, *kind),
+            value: *count as f64 / total as f64,
+        })
+    });
+    FalseAlarmRate {
+        value: hits as f64 / total as f64,
+        interval: wilson(hits, total, 0.95),
+        replicates,
+        method,
+        tests: tests.collect(),
+    }
+}

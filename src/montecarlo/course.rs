@@ -1,0 +1,239 @@
+//! The course of an experiment: everything that does not depend on the random numbers, computed once for all runs.
+
+use nalgebra::DMatrix;
+
+use super::MonteCarloError;
+use super::lanes::Truth;
+use super::sums::Layout;
+use crate::consistency::low_frequency::{block_lengths, time_constants};
+use crate::filter::gains::Epoch;
+use crate::filter::{AxisDesign, FilterDesign, GainSequence, Judge};
+use crate::model::LinearModel;
+use crate::numerics::linalg::{cholesky_semidefinite, symmetrise};
+use crate::tune::{TuneOptions, sensor_model};
+
+use super::spread::Spread;
+
+/// Times, evenly spread over a run, at which errors are judged; the time average of the NEES is over these.
+const REGULAR_EPOCHS: u64 = 100;
+/// Lags of the autocorrelation, at most.
+const LAGS: u64 = 20;
+/// Series of block means that the cumulative periodogram looks at have at least and at most this many points.
+const BLOCKS: [u64; 2] = [32, 1024];
+/// Each block length of the low-frequency test is this many times the one before.
+const LENGTH_RATIO: u64 = 4;
+/// Block lengths go up to this many times the longest time constant of the filter.
+const LONGEST_BLOCK: f64 = 16.0;
+/// More steps would need more memory for the gains than a small machine has.
+pub const MAX_STEPS: u64 = 10_000_000;
+/// Fewer steps leave no room for blocks and epochs.
+pub const MIN_STEPS: u64 = 64;
+
+/// One axis of an experiment.
+#[derive(Clone, Debug)]
+pub struct AxisCourse {
+    pub name: String,
+    pub filter: LinearModel,
+    /// The truth at its nominal parameters.
+    pub truth: LinearModel,
+    pub gains: GainSequence,
+    pub judge: Judge,
+    /// In the order of `gains.epochs`.
+    pub epochs: Vec<EpochCourse>,
+    pub channels: Vec<Channel>,
+    pub(super) nominal: Truth,
+    pub(super) spread: Option<Spread>,
+    pub(super) layout: Layout,
+}
+
+/// How errors at one epoch are judged.
+#[derive(Clone, Debug)]
+pub struct EpochCourse {
+    pub step: u64,
+    /// One of the evenly spread epochs (the others look at the start).
+    pub regular: bool,
+    /// u = W e, independent N(0, 1) for a true filter, as W A and W B of [`Judge`].
+    pub(super) of_truth: DMatrix<f64>,
+    pub(super) of_estimate: DMatrix<f64>,
+    /// W⁻¹ = L with L Lᵀ the claimed covariance.
+    pub root: DMatrix<f64>,
+    /// Claimed standard deviation of each component.
+    pub sigma: Vec<f64>,
+}
+
+/// One measurement of an axis and how its innovations are summed up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Channel {
+    pub name: String,
+    /// Taken at every n-th step.
+    pub every: u64,
+    /// Updates in a run.
+    pub updates: u64,
+    /// Lags 1..=lags of the autocorrelation.
+    pub lags: usize,
+    /// Updates in a base block.
+    pub base: u64,
+    /// Complete base blocks in a run.
+    pub blocks: usize,
+    /// Block lengths of the low-frequency test, in base blocks.
+    pub lengths: Vec<usize>,
+    /// Frequencies of the cumulative periodogram of the base blocks, without zero and Nyquist; 0 when there are too few.
+    pub ordinates: usize,
+}
+
+impl Channel {
+    fn new(name: &str, every: u64, steps: u64, time_constants: &[f64]) -> Channel {
+        let updates = steps.div_ceil(every);
+        let own: Vec<f64> = time_constants.iter().map(|t| t / every as f64).collect();
+        let least = updates.div_ceil(BLOCKS[1]);
+        let most = (updates / BLOCKS[0]).max(1);
+        let base = block_lengths(&own).first().copied().unwrap_or(1).clamp(least.min(most), most);
+        let longest = own.iter().copied().fold(0.0, f64::max) * LONGEST_BLOCK;
+        let longest = if longest > 0.0 { longest } else { f64::INFINITY };
+        let blocks = updates / base;
+        let lengths = std::iter::successors(Some(1), |length| Some(length * LENGTH_RATIO))
+            .take_while(|length| *length <= blocks && (*length == 1 || (length * base) as f64 <= longest))
+            // single updates are what the NIS judges
+            .filter(|length| length * base > 1)
+            .map(|length| length as usize)
+            .collect();
+        let ordinates = (blocks as usize - 1) / 2;
+        Channel {
+            name: name.into(),
+            every,
+            updates,
+            lags: LAGS.min(updates / 10).max(1) as usize,
+            base,
+            blocks: blocks as usize,
+            lengths,
+            ordinates: if ordinates < 8 { 0 } else { ordinates },
+        }
+    }
+
+    /// Complete blocks of `length` base blocks in a run.
+    pub fn blocks_of(&self, length: usize) -> usize {
+        self.blocks / length
+    }
+}
+
+impl AxisCourse {
+    /// `truth`: the model that is simulated; with `spread`, another one for every run.
+    pub(super) fn new(
+        design: &AxisDesign,
+        truth: LinearModel,
+        spread: Option<Spread>,
+        steps: u64,
+    ) -> Result<AxisCourse, MonteCarloError> {
+        let filter = design.model.clone();
+        let described = |m: &LinearModel| {
+            let every: Vec<String> = m.measurements.iter().zip(&m.every).map(|(m, e)| format!("{} every {e}", m.unit)).collect();
+            format!("measurements ({}) at {} Hz", every.join(", "), 1.0 / m.dt)
+        };
+        if described(&filter) != described(&truth) {
+            let (truth, filter) = (described(&truth), described(&filter));
+            return Err(MonteCarloError::Mismatch { axis: design.name.clone(), truth, filter });
+        }
+        let mut gains = GainSequence::new(&filter, steps, &epoch_steps(steps));
+        let judge = Judge::new(&filter, &truth, &gains.epochs);
+        drop_exact(&mut gains.epochs, &judge);
+        let regular_from = regular_steps(steps).next().unwrap_or(0);
+        let epochs = gains
+            .epochs
+            .iter()
+            .filter_map(|epoch| EpochCourse::new(&judge, epoch, epoch.step >= regular_from))
+            .collect();
+        let constants = time_constants(&design.steady_state.poles);
+        let channels: Vec<Channel> = filter
+            .measurements
+            .iter()
+            .zip(&gains.every)
+            .map(|(measurement, every)| Channel::new(&measurement.name, *every, steps, &constants))
+            .collect();
+        let failed = |what, source| MonteCarloError::Truth { axis: design.name.clone(), what, source };
+        cholesky_semidefinite(&truth.p0).map_err(|e| failed("P0", e))?;
+        cholesky_semidefinite(&truth.q).map_err(|e| failed("Q", e))?;
+        let nominal = Truth::of_one(&truth);
+        let layout = Layout::new(gains.epochs.len(), judge.size(), &channels);
+        Ok(AxisCourse { name: design.name.clone(), filter, truth, gains, judge, epochs, channels, nominal, spread, layout })
+    }
+
+    pub(super) fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// Updates of all measurements in a run.
+    pub fn updates(&self) -> u64 {
+        self.channels.iter().map(|c| c.updates).sum()
+    }
+
+    /// The same axis with the design itself as the truth: what the null law of the gate belongs to.
+    pub fn claimed(&self, epoch: usize) -> DMatrix<f64> {
+        self.judge.claimed(&self.gains.epochs[epoch].covariance)
+    }
+}
+
+impl EpochCourse {
+    fn new(judge: &Judge, epoch: &Epoch, regular: bool) -> Option<EpochCourse> {
+        let whiten = judge.whitening(&epoch.covariance)?;
+        let mut claimed = judge.claimed(&epoch.covariance);
+        symmetrise(&mut claimed);
+        let root = crate::numerics::linalg::cholesky(&claimed).ok()?;
+        Some(EpochCourse {
+            step: epoch.step,
+            regular,
+            of_truth: &whiten * &judge.of_truth,
+            of_estimate: &whiten * &judge.of_estimate,
+            root,
+            sigma: claimed.diagonal().iter().map(|v| v.sqrt()).collect(),
+        })
+    }
+}
+
+/// Epochs at which some judged component is known exactly have no NEES.
+fn drop_exact(epochs: &mut Vec<Epoch>, judge: &Judge) {
+    let mut kept: Vec<Epoch> = Vec::with_capacity(epochs.len());
+    let mut before: Option<DMatrix<f64>> = None;
+    for mut epoch in epochs.drain(..) {
+        if let Some(earlier) = before.take() {
+            epoch.transition = &epoch.transition * earlier;
+        }
+        if judge.whitening(&epoch.covariance).is_some() {
+            kept.push(epoch);
+        } else {
+            before = Some(epoch.transition);
+        }
+    }
+    if let Some(first) = kept.first_mut() {
+        first.transition.fill_with_identity();
+    }
+    *epochs = kept;
+}
+
+/// The evenly spread epochs.
+fn regular_steps(steps: u64) -> impl Iterator<Item = u64> {
+    let count = REGULAR_EPOCHS.min(steps);
+    (1..=count).map(move |i| i * steps / count - 1)
+}
+
+/// The first measurement and powers of four up to the first evenly spread epoch, then these.
+fn epoch_steps(steps: u64) -> Vec<u64> {
+    let first = regular_steps(steps).next().unwrap_or(0);
+    let start = std::iter::once(0).chain((0..).map(|k| 4u64.pow(k)).take_while(|step| *step < first));
+    let mut all: Vec<u64> = start.filter(|step| *step < first).chain(regular_steps(steps)).collect();
+    all.dedup();
+    all
+}
+
+/// The truth of each axis of a design: its own model.
+pub(super) fn own_models(design: &FilterDesign) -> Vec<LinearModel> {
+    design.axes.iter().map(|axis| axis.model.clone()).collect()
+}
+
+/// The model of parameters at the rate of a filter.
+pub(super) fn model_of(
+    axis: &crate::params::AxisParams,
+    design: &FilterDesign,
+) -> Result<LinearModel, MonteCarloError> {
+    sensor_model(axis, design.quantity, 1.0 / design.sample_rate_hz, &TuneOptions::default())
+        .map_err(|source| MonteCarloError::Parameters { source })
+}

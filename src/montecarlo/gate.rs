@@ -1,0 +1,328 @@
+//! The tests of the gate, and how many of them make one verdict.
+//!
+//! Every test gives a *raw* p-value from its own formula. Tests that look at many epochs, lengths or frequencies at once take the least, and
+//! the law of that least value for a true filter, drawn in [`super::law`], makes it the p-value of one test: the band is simultaneous. In the same way
+//! the least p-value over all tests and axes is held against its own law (Westfall & Young 1993, single step), so that the family-wise
+//! false-alarm probability *is* alpha, not merely bounded by it as with Holm's or Bonferroni's rule: the tests are correlated, and the
+//! law knows how.
+
+use std::fmt;
+
+use super::course::{AxisCourse, Channel};
+use crate::consistency::normalized::two_sided_p;
+use crate::numerics::distribution::{chi_square_sf, kolmogorov_sf, normal_sf};
+
+/// Below this many drawn values the tail is extrapolated.
+const FEWEST: usize = 50;
+
+/// A test of one axis; the number is that of the measurement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Mean NEES over the runs at every epoch.
+    Nees,
+    /// NEES averaged over runs and the evenly spread epochs.
+    NeesAverage,
+    /// Mean error over the runs at every epoch.
+    MeanError,
+    Nis(usize),
+    InnovationMean(usize),
+    /// Largest autocorrelation of the innovations.
+    Autocorrelation(usize),
+    /// All lags together.
+    LjungBox(usize),
+    CumulativePeriodogram(usize),
+    /// Power of block averages at every length.
+    LowFrequency(usize),
+}
+
+impl Kind {
+    /// The tests of an axis, in the order of every list of p-values.
+    pub fn of(axis: &AxisCourse) -> Vec<Kind> {
+        let mut kinds = Vec::new();
+        if !axis.epochs.is_empty() {
+            kinds.extend([Kind::Nees, Kind::NeesAverage, Kind::MeanError]);
+        }
+        for (c, channel) in axis.channels.iter().enumerate() {
+            kinds.extend([Kind::Nis(c), Kind::InnovationMean(c), Kind::Autocorrelation(c), Kind::LjungBox(c)]);
+            if channel.ordinates > 0 {
+                kinds.push(Kind::CumulativePeriodogram(c));
+            }
+            if !channel.lengths.is_empty() {
+                kinds.push(Kind::LowFrequency(c));
+            }
+        }
+        kinds
+    }
+
+    /// The name in documents, without the measurement.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Nees => "nees",
+            Kind::NeesAverage => "nees_average",
+            Kind::MeanError => "mean_error",
+            Kind::Nis(_) => "nis",
+            Kind::InnovationMean(_) => "innovation_mean",
+            Kind::Autocorrelation(_) => "autocorrelation",
+            Kind::LjungBox(_) => "ljung_box",
+            Kind::CumulativePeriodogram(_) => "cumulative_periodogram",
+            Kind::LowFrequency(_) => "low_frequency",
+        }
+    }
+
+    /// Whether the raw p-value is a least one of many, or rests on an approximation that the drawn law replaces.
+    fn is_calibrated(self) -> bool {
+        use Kind::{CumulativePeriodogram, LowFrequency, MeanError, Nees, NeesAverage};
+        matches!(self, Nees | NeesAverage | MeanError | CumulativePeriodogram(_) | LowFrequency(_))
+    }
+
+    /// The measurement the test belongs to.
+    pub fn channel(self) -> Option<usize> {
+        match self {
+            Kind::Nees | Kind::NeesAverage | Kind::MeanError => None,
+            Kind::Nis(c)
+            | Kind::InnovationMean(c)
+            | Kind::Autocorrelation(c)
+            | Kind::LjungBox(c)
+            | Kind::CumulativePeriodogram(c)
+            | Kind::LowFrequency(c) => Some(c),
+        }
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// Raw p-values from sums over `runs` runs.
+#[derive(Clone, Copy, Debug)]
+pub struct Raw<'a> {
+    pub axis: &'a AxisCourse,
+    pub runs: u64,
+    /// Independent NEES values that the average over the evenly spread epochs of one run is worth.
+    pub effective: f64,
+}
+
+impl<'a> Raw<'a> {
+    pub fn new(axis: &'a AxisCourse, runs: u64) -> Raw<'a> {
+        Raw { axis, runs, effective: effective_epochs(axis) }
+    }
+
+    /// Degrees of freedom of a NEES.
+    fn size(&self) -> f64 {
+        self.axis.judge.size() as f64
+    }
+
+    /// Least two-sided p over the epochs; `nees`: sums over the runs. All epochs have the law χ²(r M).
+    pub fn nees(&self, nees: &[f64]) -> f64 {
+        let least = nees.iter().copied().fold(f64::INFINITY, f64::min);
+        let largest = nees.iter().copied().fold(0.0, f64::max);
+        self.nees_at(least).min(self.nees_at(largest))
+    }
+
+    /// Two-sided p of one epoch.
+    pub fn nees_at(&self, sum: f64) -> f64 {
+        two_sided_p(sum, self.size() * self.runs as f64)
+    }
+
+    /// `sum` over the runs and evenly spread epochs: scaled χ² with the mean's exact variance.
+    pub fn nees_average(&self, sum: f64) -> f64 {
+        let count = self.axis.epochs.iter().filter(|e| e.regular).count() as f64;
+        two_sided_p(sum * self.effective / count, self.average_freedom())
+    }
+
+    /// Degrees of freedom of the average: r M n_eff.
+    pub fn average_freedom(&self) -> f64 {
+        self.size() * self.runs as f64 * self.effective
+    }
+
+    /// Least upper-tail p over the epochs of M |ū|², χ²(r).
+    pub fn mean_error(&self, statistics: &[f64]) -> f64 {
+        chi_square_sf(statistics.iter().copied().fold(0.0, f64::max), self.size())
+    }
+
+    /// Largest |z| over the lags and its p-value.
+    pub fn autocorrelation(z: &[f64]) -> (f64, f64) {
+        let largest = z.iter().map(|z| z.abs()).fold(0.0, f64::max);
+        let single = 2.0 * normal_sf(largest);
+        (largest, -((-single.min(1.0)).ln_1p() * z.len() as f64).exp_m1())
+    }
+
+    /// Σ z² over the lags and its upper-tail p-value.
+    pub fn ljung_box(z: &[f64]) -> (f64, f64) {
+        let sum: f64 = z.iter().map(|z| z * z).sum();
+        (sum, chi_square_sf(sum, z.len() as f64))
+    }
+
+    /// Largest distance of the cumulative periodogram from the straight line, with its sign, and Kolmogorov's p-value.
+    pub fn cumulative_periodogram(&self, ordinates: &[f64]) -> (f64, f64) {
+        let (distance, _) = periodogram_distance(ordinates);
+        (distance, kolmogorov_sf(distance.abs() * ((ordinates.len() as u64 * self.runs) as f64).sqrt()))
+    }
+
+    /// The length (by its number) that deviates most, and its two-sided p; `powers`: Σ (block sum)²/length.
+    pub fn low_frequency(&self, channel: &Channel, powers: &[f64]) -> (usize, f64) {
+        let mut least = (0, f64::INFINITY);
+        for (i, (power, length)) in powers.iter().zip(&channel.lengths).enumerate() {
+            let p = two_sided_p(*power, (self.runs * channel.blocks_of(*length) as u64) as f64);
+            if p < least.1 {
+                least = (i, p);
+            }
+        }
+        least
+    }
+}
+
+/// max_j (U_j − j/m) by size, and its j (from 1).
+pub fn periodogram_distance(ordinates: &[f64]) -> (f64, usize) {
+    let total: f64 = ordinates.iter().sum();
+    let count = ordinates.len() as f64;
+    let (mut sum, mut distance, mut at) = (0.0, 0.0f64, 0);
+    for (j, power) in ordinates.iter().enumerate() {
+        sum += power;
+        let d = sum / total - (j + 1) as f64 / count;
+        if d.abs() > distance.abs() {
+            (distance, at) = (d, j + 1);
+        }
+    }
+    (distance, at)
+}
+
+/// n_eff of the NEES averaged over the evenly spread epochs: E² r / Σ_jk |ρ_jk|², ρ_jk the correlation of the whitened errors u_j and u_k.
+///
+/// For one state ρ_jk = λ^|j−k| steps and this is n(1 − λ²)/(1 + λ²) (formula of Bar-Shalom, Li & Kirubarajan 2001, section 5.4, for a
+/// Gauss-Markov error): a run of many epochs is worth few independent ones.
+pub fn effective_epochs(axis: &AxisCourse) -> f64 {
+    let regular: Vec<usize> = (0..axis.epochs.len()).filter(|&i| axis.epochs[i].regular).collect();
+    let mut sum = axis.judge.size() as f64 * regular.len() as f64;
+    for &k in &regular {
+        let mut cross = &axis.gains.epochs[k].covariance * axis.epochs[k].of_estimate.transpose();
+        for j in k + 1..axis.epochs.len() {
+            cross = &axis.gains.epochs[j].transition * cross;
+            sum += 2.0 * (&axis.epochs[j].of_estimate * &cross).norm_squared();
+        }
+    }
+    (regular.len() as f64).powi(2) * axis.judge.size() as f64 / sum
+}
+
+/// Law of a least p-value, from drawn ones.
+///
+/// P(p_min ≤ t) is the share of drawn values up to t. Where fewer than 50 were drawn, it is 1 − (1 − t)^m with the m that fits at the
+/// fiftieth: that many independent tests would behave so.
+#[derive(Clone, Debug)]
+pub struct LeastLaw {
+    drawn: Vec<f64>,
+    tail: f64,
+    tests: f64,
+}
+
+impl LeastLaw {
+    pub fn new(mut drawn: Vec<f64>) -> LeastLaw {
+        drawn.sort_by(f64::total_cmp);
+        let at = FEWEST.min(drawn.len()).max(1) - 1;
+        let tail = drawn.get(at).copied().unwrap_or(1.0);
+        let share = (at as f64 + 0.5) / drawn.len().max(1) as f64;
+        let tests = if tail > 0.0 && tail < 1.0 { (-share).ln_1p() / (-tail).ln_1p() } else { 1.0 };
+        LeastLaw { drawn, tail, tests }
+    }
+
+    /// P(p_min ≤ t).
+    pub fn cdf(&self, t: f64) -> f64 {
+        if t.is_nan() {
+            return f64::NAN;
+        }
+        if t <= self.tail {
+            return -((-t.min(1.0)).ln_1p() * self.tests).exp_m1();
+        }
+        let above = self.drawn.partition_point(|x| *x <= t);
+        if above >= self.drawn.len() {
+            return 1.0;
+        }
+        // between two drawn values the share grows in a straight line
+        let (low, high) = (self.drawn[above - 1], self.drawn[above]);
+        let part = if high > low { (t - low) / (high - low) } else { 0.0 };
+        ((above as f64 - 0.5 + part) / self.drawn.len() as f64).min(1.0)
+    }
+
+    /// t with P(p_min ≤ t) = `p`.
+    pub fn quantile(&self, p: f64) -> f64 {
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..200 {
+            let middle = 0.5 * (low + high);
+            if self.cdf(middle) < p { low = middle } else { high = middle }
+            if high - low <= 1e-14 * high {
+                break;
+            }
+        }
+        high
+    }
+}
+
+/// The laws of one axis.
+#[derive(Clone, Debug)]
+pub struct AxisGate {
+    pub kinds: Vec<Kind>,
+    /// Of the raw p-value of each kind, where it is calibrated.
+    laws: Vec<Option<LeastLaw>>,
+    /// Of the least p-value over the kinds.
+    family: LeastLaw,
+}
+
+impl AxisGate {
+    /// `drawn`: raw p-values of each replicate.
+    pub(super) fn new(kinds: Vec<Kind>, drawn: &[Vec<f64>]) -> AxisGate {
+        let column = |i: usize| drawn.iter().map(|raw| raw[i]).collect();
+        let law = |(i, kind): (usize, &Kind)| kind.is_calibrated().then(|| LeastLaw::new(column(i)));
+        let laws: Vec<Option<LeastLaw>> = kinds.iter().enumerate().map(law).collect();
+        let mut gate = AxisGate { kinds, laws, family: LeastLaw::new(Vec::new()) };
+        gate.family = LeastLaw::new(drawn.iter().map(|raw| gate.least(raw)).collect());
+        gate
+    }
+
+    /// p-value of test `kind` from its raw one.
+    pub fn p_value(&self, kind: usize, raw: f64) -> f64 {
+        self.laws[kind].as_ref().map_or(raw, |law| law.cdf(raw))
+    }
+
+    /// The raw p-value that test `kind` must reach for the p-value `p`.
+    pub fn raw_for(&self, kind: usize, p: f64) -> f64 {
+        self.laws[kind].as_ref().map_or(p, |law| law.quantile(p))
+    }
+
+    pub(super) fn p_values(&self, raw: &[f64]) -> Vec<f64> {
+        raw.iter().enumerate().map(|(i, p)| self.p_value(i, *p)).collect()
+    }
+
+    fn least(&self, raw: &[f64]) -> f64 {
+        self.p_values(raw).into_iter().fold(1.0, f64::min)
+    }
+}
+
+/// All axes.
+#[derive(Clone, Debug)]
+pub struct Gate {
+    pub axes: Vec<AxisGate>,
+    pub alpha: f64,
+    /// A test whose p-value is at most this fails.
+    pub critical: f64,
+}
+
+impl Gate {
+    pub(super) fn new(axes: Vec<AxisGate>, alpha: f64) -> Gate {
+        let mut gate = Gate { axes, alpha, critical: 0.0 };
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..200 {
+            let middle = 0.5 * (low + high);
+            if gate.family(middle) < alpha { low = middle } else { high = middle }
+        }
+        gate.critical = low;
+        gate
+    }
+
+    /// Probability that some test of some axis of a true filter has a p-value of at most `p`: axes are independent.
+    pub fn family(&self, p: f64) -> f64 {
+        let none: f64 = self.axes.iter().map(|axis| (-axis.family.cdf(p)).ln_1p()).sum();
+        -none.exp_m1()
+    }
+}

@@ -1,0 +1,147 @@
+//! What an experiment says: the verdict document.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::calibration::FalseAlarmRate;
+use crate::consistency::{Test, Verdict};
+
+/// Runs `first`, `first` + 1, …, `end` − 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Runs {
+    pub first: u64,
+    pub end: u64,
+}
+
+impl Runs {
+    pub fn count(self) -> u64 {
+        self.end - self.first
+    }
+}
+
+/// The verdict with everything it rests on.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Outcome {
+    pub verdict: Verdict,
+    /// A sentence.
+    pub meaning: String,
+    /// Family-wise false-alarm probability of the verdict, all tests and axes together.
+    pub alpha: f64,
+    pub runs: Runs,
+    /// Samples per run.
+    pub steps: u64,
+    pub duration_s: f64,
+    pub seed: u64,
+    /// A test fails when its p-value is at or below this; set so that a true filter fails some test with probability alpha.
+    pub critical_p_value: f64,
+    /// Measured; absent where it was not asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub false_alarm_rate: Option<FalseAlarmRate>,
+    /// Adjusted p-values are family-wise.
+    pub tests: Vec<Test>,
+    pub axes: Vec<AxisOutcome>,
+}
+
+/// Curves of one axis. Errors are those of all states, or of the whole drift where filter and truth have different states.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct AxisOutcome {
+    pub name: String,
+    pub nees: NeesCurve,
+    pub nees_average: NeesAverage,
+    pub credibility: Option<Credibility>,
+    /// One per component of the error.
+    pub errors: Vec<Component>,
+    /// One per measurement.
+    pub innovations: Vec<Innovations>,
+}
+
+/// Mean NEES over the runs, divided by the number of components: 1 when the covariance is right.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct NeesCurve {
+    pub time_s: Vec<f64>,
+    pub mean: Vec<f64>,
+    /// The whole curve lies in [lower, upper] unless the gate rejects: a simultaneous band at the critical p-value.
+    pub lower: f64,
+    pub upper: f64,
+}
+
+/// NEES averaged over runs and evenly spread times.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct NeesAverage {
+    pub mean: f64,
+    pub lower: f64,
+    pub upper: f64,
+    /// Independent errors that one run is worth, from the filter's own closed-loop transitions.
+    pub effective_epochs: f64,
+}
+
+/// Indices of Li and Zhao (2005), averaged over evenly spread times.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Credibility {
+    /// Noncredibility index, dB: 0 for a perfect covariance; sampling alone gives a little.
+    pub nci_db: f64,
+    /// Inclination, dB: positive when the filter is too proud, negative when it is too timid.
+    pub inclination_db: f64,
+    /// Of the inclination.
+    pub standard_error_db: f64,
+    pub meaning: String,
+}
+
+/// Errors of one component at the times of the NEES curve; SI units.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Component {
+    pub name: String,
+    pub unit: String,
+    /// Mean over the runs.
+    pub mean: Vec<f64>,
+    /// Root mean square over the runs.
+    pub rms: Vec<f64>,
+    /// The filter's own.
+    pub predicted_sigma: Vec<f64>,
+    /// Share of the runs within 1, 2, 3 predicted sigma; 0.6827, 0.9545, 0.9973 for a true filter.
+    pub within_1_sigma: Vec<f64>,
+    pub within_2_sigma: Vec<f64>,
+    pub within_3_sigma: Vec<f64>,
+}
+
+/// Normalised innovations ν/√S of one measurement over all runs.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Innovations {
+    pub name: String,
+    pub updates: u64,
+    /// Mean square.
+    pub nis: f64,
+    pub mean: f64,
+    /// Lags 1, 2, …
+    pub autocorrelation: Vec<f64>,
+    pub low_frequency: Vec<LowFrequency>,
+    pub cumulative_periodogram: Periodogram,
+    pub nis_histogram: Histogram,
+}
+
+/// Power of innovations averaged over blocks, relative to what the filter says.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct LowFrequency {
+    pub averaging_s: f64,
+    pub ratio: f64,
+    pub lower: f64,
+    pub upper: f64,
+}
+
+/// Share of the power of block means at or below each frequency.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Periodogram {
+    pub frequency_hz: Vec<f64>,
+    pub share: Vec<f64>,
+    /// Half width of the band around the straight line; null where there are too few blocks.
+    pub half_width: f64,
+}
+
+/// Shares of the NIS values between edges, the last bin open to the right.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Histogram {
+    pub edges: Vec<f64>,
+    pub observed: Vec<f64>,
+    /// χ² with one degree of freedom.
+    pub expected: Vec<f64>,
+}

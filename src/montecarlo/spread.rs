@@ -1,0 +1,58 @@
+//! Truths drawn from what an identification leaves open: a design is judged over the sensors it may meet.
+
+use super::course::model_of;
+use super::lanes::PARAMETERS;
+use super::MonteCarloError;
+use crate::filter::FilterDesign;
+use crate::model::LinearModel;
+use crate::numerics::random::{StreamId, normal, stream};
+use crate::params::{AxisParams, Measured};
+
+/// 97.5 % point of the normal law: half of a 95 % interval in standard deviations.
+const Z95: f64 = 1.959_963_984_540_054;
+
+/// Parameters of one axis with their intervals.
+#[derive(Clone, Debug)]
+pub(super) struct Spread {
+    axis: AxisParams,
+    design: FilterDesign,
+}
+
+impl Spread {
+    /// Errors: no parameter of the axis has an interval.
+    pub(super) fn new(axis: &AxisParams, design: &FilterDesign) -> Result<Spread, MonteCarloError> {
+        let mut axis = axis.clone();
+        if axis.noise_parameters().all(|(_, parameter)| log_spread(parameter).is_none()) {
+            return Err(MonteCarloError::NoIntervals { axis: axis.name });
+        }
+        Ok(Spread { axis, design: FilterDesign { axes: Vec::new(), ..design.clone() } })
+    }
+
+    /// The truth of a run: every parameter with an interval is log-normal with the value as its median and the interval as its 95 %
+    /// range. Parameters outside what a model can be built from give the nominal one.
+    pub(super) fn draw(&self, seed: u64, run: u64, number: u32, nominal: &LinearModel) -> LinearModel {
+        let mut axis = self.axis.clone();
+        for (term, (_, parameter)) in (PARAMETERS..).zip(axis.noise_parameters()) {
+            if let Some(spread) = log_spread(parameter) {
+                let draw = normal(&mut stream(seed, StreamId { run, axis: number, term }));
+                parameter.value *= (spread * draw).exp();
+            }
+        }
+        model_of(&axis, &self.design)
+            .ok()
+            .filter(|model| model.states == nominal.states)
+            .unwrap_or_else(|| nominal.clone())
+    }
+}
+
+/// Standard deviation of the logarithm; from the closed side of an interval that is open on the other.
+fn log_spread(parameter: &Measured) -> Option<f64> {
+    let [lower, upper] = parameter.interval?;
+    let below = (lower > 0.0).then(|| (parameter.value / lower).ln());
+    let above = upper.is_finite().then(|| (upper / parameter.value).ln());
+    let width = match (below, above) {
+        (Some(below), Some(above)) => 0.5 * (below + above),
+        (one, other) => one.or(other)?,
+    };
+    Some(width / Z95).filter(|spread| *spread > 0.0)
+}

@@ -5,7 +5,7 @@ use kfdesign::filter::FilterDesign;
 use kfdesign::montecarlo::{Plan, verify, verify_against};
 use kfdesign::noise::Term;
 use kfdesign::params::{AxisParams, Measured, Params, TermEntry};
-use kfdesign::tune::{TuneOptions, Tuned, tune};
+use kfdesign::tune::{TuneOptions, Tuned, sensor_model, tune};
 use kfdesign::units::{Quantity, Unit};
 
 use super::support::{Bench, data};
@@ -220,6 +220,13 @@ fn what_no_filter_can_tell_apart_is_one_state() {
     let plan = Plan { runs: 100, steps: 3000, seed: 3, alpha: 1e-5 };
     let outcome = verify(&ramp.design, &plan, &|_| ()).unwrap();
     assert_eq!(outcome.verdict, Verdict::Consistent, "{:?}", outcome.tests);
+}
+
+#[test]
+fn the_sensor_model_is_the_one_that_the_filter_is_built_on() {
+    let params = four_sources();
+    let model = sensor_model(&params.axes[0], params.quantity, 0.1, &TuneOptions::default()).unwrap();
+    assert_eq!(model, tuned(&params).design.axes[0].model);
 }
 
 #[test]

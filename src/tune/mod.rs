@@ -110,7 +110,9 @@ pub fn tune(params: &Params, options: &TuneOptions) -> Result<Tuned, TuneError> 
     Ok(Tuned { design, reports })
 }
 
-/// The model of one axis that [`tune`] builds its filter on; `dt` in s.
+/// The linear model that [`tune`] builds a filter on, with which a sensor of these parameters can also be simulated; `dt` in s.
+///
+/// Errors: no white noise, `dt` or the flicker horizon out of range.
 pub fn sensor_model(
     axis: &AxisParams,
     quantity: Quantity,

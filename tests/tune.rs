@@ -1,5 +1,7 @@
 //! The tuned design against printed vectors and an independent implementation; its verification by Monte Carlo.
 
+mod under_truth;
+
 use kfdesign::consistency::Verdict;
 use kfdesign::filter::FilterDesign;
 use kfdesign::montecarlo::{Plan, verify, verify_against};

@@ -2,6 +2,7 @@
 
 mod sight;
 mod text;
+mod truth;
 
 use std::path::{Path, PathBuf};
 
@@ -19,7 +20,7 @@ use crate::model::Plant;
 use crate::montecarlo::{Outcome, Plan, verify};
 use crate::params::Params;
 use crate::replay::{LogShape, Options, ReplayResult, Replayer};
-use crate::tune::{AxisReport, TuneOptions, Tuned, tune};
+use crate::tune::{AxisReport, TuneOptions, Tuned, UnderTruth, tune, under_truth};
 
 /// The augmented Kalman filter from params.json
 ///
@@ -39,6 +40,9 @@ pub struct Args {
     /// Slowest time constant that the states for flicker cover
     #[arg(long, default_value_t = TuneOptions::default().flicker_horizon_s, value_name = "SECONDS")]
     flicker_horizon: f64,
+    /// Also say what the design does when the sensor has these parameters instead
+    #[arg(long, value_name = "PARAMS")]
+    truth: Option<PathBuf>,
     /// Runs of the Monte Carlo
     #[arg(long, default_value_t = 100, value_name = "N")]
     runs: u64,
@@ -54,7 +58,7 @@ pub struct Args {
     /// Figure of the predicted sigma of every axis
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
-    /// One JSON document on stdout: the filter, the reports, the verification
+    /// One JSON document on stdout: the filter, the reports, the verification, and what --truth and --log gave
     #[arg(long)]
     json: bool,
     #[command(flatten)]
@@ -68,12 +72,14 @@ struct Printed<'a> {
     reports: &'a [AxisReport],
     verification: &'a Outcome,
     #[serde(skip_serializing_if = "Option::is_none")]
+    under_truth: Option<&'a [UnderTruth]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     replay: Option<&'a ReplayResult>,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     for output in [&args.output, &args.report, &args.plot].into_iter().flatten() {
-        for input in std::iter::once(&args.params).chain(&args.log) {
+        for input in std::iter::once(&args.params).chain(&args.log).chain(&args.truth) {
             atomic::check_output(output, input)?;
         }
     }
@@ -82,6 +88,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let options =
         TuneOptions { plant: Plant::parse(&args.plant).context("--plant")?, flicker_horizon_s: args.flicker_horizon };
     let mut tuned = tune(&params, &options).with_context(|| name.clone())?;
+    let truth = args.truth.as_deref().map(|path| Truth::read(path, &tuned, &options)).transpose()?;
     let plan = Plan { runs: args.runs, seed: args.seed, ..Plan::quick(params.sample_rate_hz) };
     let bar = progress(plan.runs * tuned.design.axes.len() as u64, "verify");
     let verification = verify(&tuned.design, &plan, &|runs| bar.inc(runs))?;
@@ -98,7 +105,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         atomic::write(output, tuned.design.to_json().as_bytes())?;
     }
     let replay = args.log.as_deref().map(|log| replay(args, &tuned, log)).transpose()?;
-    let view = text::View { name: &name, params: &params, tuned: &tuned, verification: &verification };
+    let view =
+        text::View { name: &name, params: &params, tuned: &tuned, verification: &verification, truth: truth.as_ref() };
     if let Some(path) = &args.plot {
         atomic::write(path, sight::sheet(&view).as_bytes())?;
     }
@@ -107,7 +115,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     }
     if args.json {
         let filter = serde_json::from_str(&tuned.design.to_json())?;
-        print_json(&Printed { filter, reports: &tuned.reports, verification: &verification, replay: replay.as_ref() })?;
+        print_json(&Printed {
+            filter,
+            reports: &tuned.reports,
+            verification: &verification,
+            under_truth: truth.as_ref().map(|t| t.axes.as_slice()),
+            replay: replay.as_ref(),
+        })?;
     } else {
         let mut printed = text::design(&view);
         if let Some(result) = &replay {
@@ -120,6 +134,20 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     }
     let contradicted = replay.is_some_and(|r| r.verdict == Verdict::Inconsistent);
     Ok(if verified && !contradicted { Status::Done } else { Status::CheckFailed })
+}
+
+/// What `--truth` asks for.
+struct Truth {
+    name: String,
+    axes: Vec<UnderTruth>,
+}
+
+impl Truth {
+    fn read(path: &Path, tuned: &Tuned, options: &TuneOptions) -> anyhow::Result<Truth> {
+        let name = path.display().to_string();
+        let axes = under_truth(tuned, &Params::read(path)?, options).with_context(|| name.clone())?;
+        Ok(Truth { name, axes })
+    }
 }
 
 fn written(output: &Path, verified: bool) -> String {

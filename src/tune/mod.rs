@@ -1,12 +1,14 @@
 //! Noise parameters to a filter design: augmentation, steady state, predicted sigma(t), error budget (floor 4).
 //!
 //! `sensor` turns the parameters of an axis into a linear model (merging what no filter can tell apart), `prediction` propagates its
-//! covariance over any time, `closed_loop` splits the final variance into its causes and finds the bandwidth.
+//! covariance over any time, `closed_loop` splits the final variance into its causes and finds the bandwidth,
+//! `under_truth` says what the design does when the sensor is another.
 
 mod closed_loop;
 mod flicker;
 mod prediction;
 mod sensor;
+mod under_truth;
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -15,6 +17,7 @@ use serde_json::json;
 use crate::filter::steady_state::{SteadyStateError, steady_state};
 use crate::filter::{AxisDesign, FilterDesign};
 use crate::model::{LinearModel, ModelError, Plant};
+use crate::noise::Term;
 use crate::numerics::linalg::LinalgError;
 use crate::params::{AxisParams, Params};
 use crate::units::Quantity;
@@ -22,6 +25,7 @@ use crate::units::Quantity;
 pub use closed_loop::{Share, bandwidth_hz, error_budget};
 pub use flicker::FlickerApproximation;
 pub use prediction::{Predicted, predicted_sigma};
+pub use under_truth::{ErrorOverTime, Tendency, UnderTruth, under_truth};
 
 /// Choices of [`tune`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,6 +54,10 @@ pub enum TuneError {
     SteadyState { axis: String, source: SteadyStateError },
     #[error("axis '{axis}': {source}")]
     Linalg { axis: String, source: LinalgError },
+    #[error("the truth has the axes {truth}, the design {design}; expected the same names")]
+    TruthAxes { truth: String, design: String },
+    #[error("the truth is in {truth}, the design in {design}")]
+    TruthQuantity { truth: &'static str, design: &'static str },
 }
 
 /// What a design promises for one axis, SI units.
@@ -129,7 +137,13 @@ fn tune_axis(
     options: &TuneOptions,
 ) -> Result<(AxisDesign, AxisReport), TuneError> {
     let dt = 1.0 / sample_rate_hz;
-    let sensor = sensor::build(axis, quantity, dt, options)?;
+    let mut sensor = sensor::build(axis, quantity, dt, options)?;
+    if axis.noise().terms.iter().all(|term| matches!(term, Term::White { .. })) {
+        sensor.warnings.push(
+            "the parameters have no drift process: the filter averages for ever and its gain tends to zero; a real sensor drifts"
+                .into(),
+        );
+    }
     let steady =
         steady_state(&sensor.model).map_err(|source| TuneError::SteadyState { axis: axis.name.clone(), source })?;
     let failed = |source| TuneError::Linalg { axis: axis.name.clone(), source };

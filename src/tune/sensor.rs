@@ -55,12 +55,6 @@ pub(super) fn build(
         model.p0[(i, i)] = bias.std_dev * bias.std_dev;
     }
     let model = share_level(model, &mut warnings);
-    if !noise.terms.iter().any(|t| !matches!(t, Term::White { .. })) {
-        warnings.push(
-            "the parameters have no drift process: the filter averages for ever and its gain tends to zero; a real sensor drifts"
-                .into(),
-        );
-    }
     if let Some(flicker) = &flicker {
         warnings.push(format!(
             "flicker has no exact filter: {} Gauss-Markov states stand for it, {} faster ones are part of R (+{:.2} %); the Allan deviation \

@@ -1,6 +1,7 @@
 //! Figures and the report page of a design.
 
 use super::text::{self, Group, View, shown};
+use super::truth;
 use crate::cli::output::digits;
 use crate::montecarlo::{AxisOutcome, Outcome};
 use crate::replay::ReplayResult;
@@ -28,6 +29,7 @@ pub(super) fn page(view: &View<'_>, replay: Option<&ReplayResult>) -> Page {
         provenance.push(("source of the parameters".to_string(), note));
     }
     let mut sections: Vec<Section> = view.groups().iter().map(|g| section(g, params.quantity)).collect();
+    sections.extend(truth::sections(view));
     let tests = outcome.tests.iter().map(|t| {
         vec![
             t.axis.clone(),

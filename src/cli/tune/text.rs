@@ -1,5 +1,6 @@
 //! A design as a person reads it.
 
+use super::{Truth, truth};
 use crate::cli::output::{digits, table};
 use crate::consistency::Verdict;
 use crate::filter::AxisDesign;
@@ -16,6 +17,7 @@ pub(super) struct View<'a> {
     pub(super) params: &'a Params,
     pub(super) tuned: &'a Tuned,
     pub(super) verification: &'a Outcome,
+    pub(super) truth: Option<&'a Truth>,
 }
 
 /// One or more axes with the same design.
@@ -50,10 +52,14 @@ impl View<'_> {
 
 impl Group<'_> {
     pub(super) fn title(&self) -> String {
-        match self.names.as_slice() {
-            [one] => format!("axis {one}"),
-            many => format!("axes {} (identical)", many.join(", ")),
-        }
+        title(&self.names)
+    }
+}
+
+pub(super) fn title(names: &[&str]) -> String {
+    match names {
+        [one] => format!("axis {one}"),
+        many => format!("axes {} (identical)", many.join(", ")),
     }
 }
 
@@ -106,6 +112,7 @@ pub(super) fn design(view: &View<'_>) -> String {
             out.push_str(&format!("note: {warning}\n"));
         }
     }
+    out.push_str(&truth::text(view));
     out.push_str(&verification(view.verification, params.sample_rate_hz));
     out
 }

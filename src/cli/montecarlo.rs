@@ -18,6 +18,8 @@ use crate::export::{atomic, junit, table::TableWriter};
 use crate::filter::FilterDesign;
 use crate::montecarlo::calibration::{self, REPLICATES};
 use crate::montecarlo::document::{self, Shard};
+use crate::montecarlo::gate::Gate;
+use crate::montecarlo::power::{self, Mistuning};
 use crate::montecarlo::{Course, Experiment, Outcome, Runs, Totals, conclude};
 use crate::params::Params;
 use crate::units::Dimension;
@@ -94,6 +96,15 @@ struct Outputs {
     /// Test report for CI servers
     #[arg(long, value_name = "FILE.xml")]
     junit: Option<PathBuf>,
+    /// Print what the gate would see: the smallest mistuning of every parameter that is caught with 90 % probability
+    #[arg(long)]
+    power: bool,
+    /// With --power: simulate each of these sizes this many times and count
+    #[arg(long, default_value_t = 0, value_name = "N", requires = "power")]
+    confirm: u64,
+    /// How many runs, or how long ones, see this mistuning: \"gauss_markov.std_dev x1.3\" (the filter's value is 1.3 times the true one)
+    #[arg(long, value_name = "\"PARAMETER xFACTOR\"")]
+    plan: Vec<String>,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
@@ -198,7 +209,10 @@ fn many_runs(args: &Args, experiment: &Experiment, course: &Course) -> anyhow::R
                 runs.end - runs.start,
                 path.display()
             ),
-            None => bail!("interrupted after {done} of {} runs; with -o FILE they would have been kept", runs.end - runs.start),
+            None => bail!(
+                "interrupted after {done} of {} runs; with -o FILE they would have been kept",
+                runs.end - runs.start
+            ),
         }
     }
     args.outputs.finish(experiment, course, &totals, runs)
@@ -222,7 +236,9 @@ pub(super) fn merge(args: &MergeArgs) -> anyhow::Result<Status> {
 
 /// One run alone, as a table.
 fn one_run(args: &Args, experiment: &Experiment, course: &Course, number: u64) -> anyhow::Result<Status> {
-    let Some(path) = &args.outputs.output else { bail!("--run {number} needs -o FILE for its numbers (.csv, .csv.gz or .npy)") };
+    let Some(path) = &args.outputs.output else {
+        bail!("--run {number} needs -o FILE for its numbers (.csv, .csv.gz or .npy)")
+    };
     let traces = course.trace(number);
     let time: Vec<f64> = (0..course.steps).map(|step| step as f64 * course.dt).collect();
     let unit = experiment.design.quantity.si_unit();
@@ -294,6 +310,10 @@ impl Outputs {
                 rate
             }
         });
+        let mut planned = String::new();
+        if experiment.truth.is_none() || self.power || !self.plan.is_empty() {
+            planned = self.look(experiment, course, &gate, &mut outcome)?;
+        }
         let json = document::to_json(experiment, &outcome, totals);
         if let Some(path) = &self.output {
             atomic::write(path, json.as_bytes())?;
@@ -304,10 +324,91 @@ impl Outputs {
         if self.json {
             print_text(&json)?;
         } else {
-            print_text(&text::outcome(&outcome))?;
+            let power = if self.power { text::power(&outcome) } else { String::new() };
+            print_text(&format!("{power}{planned}{}", text::outcome(&outcome)))?;
         }
         Ok(status(&outcome))
     }
+}
+
+impl Outputs {
+    /// What the gate sees when the design is wrong, into the outcome; the plans as text.
+    fn look(
+        &self,
+        experiment: &Experiment,
+        course: &Course,
+        gate: &Gate,
+        outcome: &mut Outcome,
+    ) -> anyhow::Result<String> {
+        let runs = outcome.runs.count();
+        // power is that of the design as its own truth; another truth may be judged by other components
+        let (own, of_own);
+        let (course, gate) = if experiment.truth.is_none() && !experiment.truth_spread {
+            (course, gate)
+        } else {
+            own = experiment.own_course()?;
+            of_own = calibration::gate(&own, runs, experiment.alpha, REPLICATES);
+            (&own, &of_own)
+        };
+        let plans: Vec<(usize, Mistuning, f64, &str)> =
+            self.plan.iter().map(|text| planned(experiment, course, text)).collect::<Result<_, _>>()?;
+        if experiment.truth.is_none() || self.power {
+            outcome.detects = power::detectable(experiment, course, gate, runs);
+        }
+        if self.confirm > 0 {
+            let sizes: usize =
+                outcome.detects.iter().map(|d| d.too_large.iter().count() + d.too_small.iter().count()).sum();
+            let bar = progress(sizes as u64 * self.confirm * runs, "confirm");
+            power::confirm(experiment, course, gate, runs, self.confirm, &mut outcome.detects, &|n| bar.inc(n))?;
+            bar.finish_and_clear();
+        }
+        let mut text = String::new();
+        for (number, what, size, wished) in plans {
+            let needed = power::plan(experiment, course, gate, runs, number, &what, size)?;
+            text.push_str(&text::plan(outcome, wished, &needed));
+        }
+        Ok(text)
+    }
+}
+
+/// The axis, what is wrong about it and by how much: `gauss_markov.std_dev x1.3`, with `y:` before it for another axis than the first.
+fn planned<'a>(
+    experiment: &Experiment,
+    course: &Course,
+    text: &'a str,
+) -> anyhow::Result<(usize, Mistuning, f64, &'a str)> {
+    let (axis, rest) = text.split_once(':').map_or((None, text), |(axis, rest)| (Some(axis.trim()), rest));
+    let number = match axis {
+        None => 0,
+        Some(name) => course.axes.iter().position(|a| a.name == name).with_context(|| {
+            let names: Vec<&str> = course.axes.iter().map(|a| a.name.as_str()).collect();
+            format!("--plan \"{text}\": no axis '{name}'; there are {}", names.join(", "))
+        })?,
+    };
+    let course = &course.axes[number];
+    let all = Mistuning::all(experiment, number, course);
+    let names: Vec<String> = all.iter().map(|what| what.name(course)).collect();
+    let expected = || {
+        format!(
+            "--plan \"{text}\": expected a parameter and a factor like \"{} x1.3\"; parameters: {}",
+            names.first().map_or("P0 of bias", String::as_str),
+            names.join(", ")
+        )
+    };
+    let (name, factor) = rest.trim().rsplit_once(char::is_whitespace).with_context(expected)?;
+    let what = all
+        .iter()
+        .zip(&names)
+        .find(|(_, known)| *known == name.trim())
+        .map(|(what, _)| what.clone())
+        .with_context(expected)?;
+    let factor = factor.trim_start_matches(['x', '×']);
+    let size = factor
+        .parse::<f64>()
+        .ok()
+        .filter(|f| f.is_finite() && *f > 0.0 && *f != 1.0 && (1e-3..=1e3).contains(f))
+        .with_context(expected)?;
+    Ok((number, what, size, text))
 }
 
 fn status(outcome: &Outcome) -> Status {

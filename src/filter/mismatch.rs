@@ -55,8 +55,8 @@ impl ExpectedError {
         Some(2.0 * covariance.norm_squared() + 4.0 * mean.dot(&(&covariance * &mean)))
     }
 
-    /// L⁻¹ μ and L⁻¹ Σ L⁻ᵀ with C = L Lᵀ.
-    fn whitened(&self) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    /// L⁻¹ μ and L⁻¹ Σ L⁻ᵀ with C = L Lᵀ; `None` where C is singular.
+    pub fn whitened(&self) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let l = cholesky(&self.claimed).ok()?;
         let half = l.solve_lower_triangular(&self.covariance)?;
         let covariance = l.solve_lower_triangular(&half.transpose())?;

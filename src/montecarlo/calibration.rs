@@ -98,6 +98,36 @@ pub fn false_alarms_of_experiments(
     rate(own, gate, replicates, Method::Experiments, raw)
 }
 
+/// How often a wrong filter was caught.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Caught {
+    pub caught: u64,
+    pub of: u64,
+}
+
+/// Whole experiments on one axis: how often some test has a p-value of at most `critical`.
+pub fn caught_of_experiments(
+    course: &Course,
+    gate: &AxisGate,
+    critical: f64,
+    runs: u64,
+    experiments: u64,
+    progress: &(dyn Fn(u64) + Sync),
+) -> Caught {
+    let failed = |experiment: &u64| {
+        let first = FIRST_RUN + experiment * runs.next_multiple_of(4);
+        let totals = course.sums(first..first + runs, progress);
+        let mut axes = course.axes.iter().zip(&totals);
+        axes.any(|(axis, totals)| {
+            let raw = conclusion::raw_p_values(axis, totals, runs);
+            // a p-value that is not a number is no pass
+            gate.p_values(&raw).into_iter().any(|p| !(p > critical))
+        })
+    };
+    Caught { caught: (0..experiments).filter(failed).count() as u64, of: experiments }
+}
+
 fn rate(
     course: &Course,
     gate: &Gate,

@@ -9,6 +9,7 @@ use super::sums::{NIS_BIN, NIS_BINS, Totals};
 use super::{credibility, sentences};
 use crate::consistency::Test;
 use crate::consistency::normalized::two_sided_p;
+use crate::filter::mismatch::expect;
 use crate::numerics::distribution::{chi_square_cdf, chi_square_quantile, normal_quantile};
 
 /// Sums of one axis with what they belong to.
@@ -194,6 +195,12 @@ impl<'a> Summary<'a> {
     }
 
     fn outcome(&self, gate: &AxisGate, critical: f64) -> AxisOutcome {
+        let none: Vec<Vec<u64>> = vec![Vec::new(); self.axis.channels.len()];
+        let expected = expect(&self.axis.filter, &self.axis.truth, &self.axis.gains, &self.axis.judge, &none);
+        let size = self.size() as f64;
+        let curve: Vec<f64> = expected.epochs.iter().map(|e| e.nees().map_or(f64::NAN, |nees| nees / size)).collect();
+        let regular: Vec<f64> =
+            curve.iter().zip(&self.axis.epochs).filter(|(_, epoch)| epoch.regular).map(|(nees, _)| *nees).collect();
         let level = |wanted: &dyn Fn(Kind) -> bool| {
             let number = gate.kinds.iter().position(|kind| wanted(*kind));
             number.map_or(critical, |number| gate.raw_for(number, critical))
@@ -208,11 +215,13 @@ impl<'a> Summary<'a> {
             nees: NeesCurve {
                 time_s: self.axis.epochs.iter().map(|e| e.step as f64 * self.axis.filter.dt).collect(),
                 mean: self.all_nees().into_iter().map(|sum| sum / freedom).collect(),
+                expected: curve,
                 lower: band(nees, freedom)[0],
                 upper: band(nees, freedom)[1],
             },
             nees_average: NeesAverage {
                 mean: sum / (count as f64 * freedom),
+                expected: regular.iter().sum::<f64>() / regular.len() as f64,
                 lower,
                 upper,
                 effective_epochs: self.raw.effective,
@@ -222,7 +231,8 @@ impl<'a> Summary<'a> {
             innovations: (0..self.axis.channels.len())
                 .map(|c| {
                     let bound = |kind| level(&|other| other == kind);
-                    self.innovations(c, bound(Kind::LowFrequency(c)), bound(Kind::CumulativePeriodogram(c)))
+                    let bounds = [bound(Kind::LowFrequency(c)), bound(Kind::CumulativePeriodogram(c))];
+                    self.innovations(c, expected.innovations[c].nis, bounds)
                 })
                 .collect(),
         }
@@ -268,7 +278,7 @@ impl<'a> Summary<'a> {
         }
     }
 
-    fn innovations(&self, c: usize, low_frequency: f64, periodogram: f64) -> Innovations {
+    fn innovations(&self, c: usize, expected_nis: f64, [low_frequency, periodogram]: [f64; 2]) -> Innovations {
         let channel = &self.axis.channels[c];
         let powers = self.powers(c);
         let averages = powers.iter().zip(&channel.lengths).enumerate().map(|(i, (power, length))| {
@@ -279,10 +289,13 @@ impl<'a> Summary<'a> {
         let ordinates = self.ordinates(c);
         let total: f64 = ordinates.iter().sum();
         let mut sum = 0.0;
-        let share: Vec<f64> = ordinates.iter().map(|power| {
-            sum += power / total;
-            sum
-        }).collect();
+        let share: Vec<f64> = ordinates
+            .iter()
+            .map(|power| {
+                sum += power / total;
+                sum
+            })
+            .collect();
         let span = channel.base as f64 * channel.blocks as f64 * self.interval(c);
         let place = self.axis.layout.histogram(c);
         let edges: Vec<f64> = (0..=NIS_BINS).map(|i| i as f64 * NIS_BIN).collect();
@@ -290,6 +303,7 @@ impl<'a> Summary<'a> {
             name: channel.name.clone(),
             updates: channel.updates * self.raw.runs,
             nis: self.squares(c) / self.updates(c),
+            expected_nis,
             mean: self.innovation_mean(c),
             autocorrelation: self.lags(c).0,
             low_frequency: averages.collect(),
@@ -339,7 +353,13 @@ pub(super) fn raw_p_values(axis: &AxisCourse, totals: &Totals, runs: u64) -> Vec
 }
 
 /// Tests, adjusted and judged, and curves of an axis.
-pub(super) fn conclude(number: usize, axis: &AxisCourse, totals: &Totals, runs: u64, gate: &Gate) -> (AxisOutcome, Vec<Test>) {
+pub(super) fn conclude(
+    number: usize,
+    axis: &AxisCourse,
+    totals: &Totals,
+    runs: u64,
+    gate: &Gate,
+) -> (AxisOutcome, Vec<Test>) {
     let summary = Summary::new(axis, totals, runs);
     let own = &gate.axes[number];
     let tests = own.kinds.iter().enumerate().map(|(i, kind)| {

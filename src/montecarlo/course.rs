@@ -126,7 +126,8 @@ impl AxisCourse {
     ) -> Result<AxisCourse, MonteCarloError> {
         let filter = design.model.clone();
         let described = |m: &LinearModel| {
-            let every: Vec<String> = m.measurements.iter().zip(&m.every).map(|(m, e)| format!("{} every {e}", m.unit)).collect();
+            let every: Vec<String> =
+                m.measurements.iter().zip(&m.every).map(|(m, e)| format!("{} every {e}", m.unit)).collect();
             format!("measurements ({}) at {} Hz", every.join(", "), 1.0 / m.dt)
         };
         if described(&filter) != described(&truth) {
@@ -154,7 +155,18 @@ impl AxisCourse {
         cholesky_semidefinite(&truth.q).map_err(|e| failed("Q", e))?;
         let nominal = Truth::of_one(&truth);
         let layout = Layout::new(gains.epochs.len(), judge.size(), &channels);
-        Ok(AxisCourse { name: design.name.clone(), filter, truth, gains, judge, epochs, channels, nominal, spread, layout })
+        Ok(AxisCourse {
+            name: design.name.clone(),
+            filter,
+            truth,
+            gains,
+            judge,
+            epochs,
+            channels,
+            nominal,
+            spread,
+            layout,
+        })
     }
 
     pub(super) fn layout(&self) -> &Layout {

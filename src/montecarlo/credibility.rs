@@ -24,7 +24,8 @@ pub(super) fn credibility(mean_log: f64, moments: &[Vec<f64>], size: usize, inde
     let inclination_db = 10.0 * (mean_log - of_law);
     let standard_error_db = 10.0 / std::f64::consts::LN_10 * (trigamma_of_half(size) / independent).sqrt();
     let directions = directions(size);
-    let nci_db = 10.0 * moments.iter().map(|m| mean_absolute_log(m, size, &directions)).sum::<f64>() / moments.len() as f64;
+    let nci_db =
+        10.0 * moments.iter().map(|m| mean_absolute_log(m, size, &directions)).sum::<f64>() / moments.len() as f64;
     let size_db = format!("{:.2} dB", inclination_db.abs());
     let meaning = if inclination_db.abs() <= 3.0 * standard_error_db {
         "the filter is as proud as its errors allow".to_string()

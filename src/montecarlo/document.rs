@@ -82,6 +82,7 @@ pub fn partial_json(experiment: &Experiment, course: &Course, runs: Runs, totals
         seed: experiment.seed,
         critical_p_value: f64::NAN,
         false_alarm_rate: None,
+        detects: Vec::new(),
         tests: Vec::new(),
         axes: Vec::new(),
     };
@@ -113,7 +114,10 @@ impl Shard {
         })?;
         if value.get("format").and_then(Value::as_str) != Some(FORMAT) {
             let found = value.get("format").unwrap_or(&Value::Null);
-            return Err(wrong("format", format!("found {found}, expected \"{FORMAT}\", as written by kfdesign montecarlo")));
+            return Err(wrong(
+                "format",
+                format!("found {found}, expected \"{FORMAT}\", as written by kfdesign montecarlo"),
+            ));
         }
         let experiment = value.get("experiment").ok_or_else(|| wrong("experiment", "is missing".into()))?;
         let experiment = Experiment::from_value(experiment, path)?;
@@ -124,13 +128,21 @@ impl Shard {
         };
         let sums = value.get("sums").and_then(Value::as_array).ok_or_else(|| wrong("sums", "is missing".into()))?;
         let axis = |(i, sums): (usize, &Value)| {
-            let expected = || wrong(&format!("sums[{i}]"), "expected \"values\" (lists of numbers) and \"counts\" (whole numbers)".into());
+            let expected = || {
+                wrong(
+                    &format!("sums[{i}]"),
+                    "expected \"values\" (lists of numbers) and \"counts\" (whole numbers)".into(),
+                )
+            };
             let values = sums.get("values").and_then(Value::as_array).ok_or_else(expected)?;
             let counts = sums.get("counts").and_then(Value::as_array).ok_or_else(expected)?;
             let digits = |digits: &Value| {
                 let digits = digits.as_array()?;
                 // what is not finite is written as null
-                digits.iter().map(|d| if d.is_null() { Some(f64::NAN) } else { d.as_f64() }).collect::<Option<Vec<f64>>>()
+                digits
+                    .iter()
+                    .map(|d| if d.is_null() { Some(f64::NAN) } else { d.as_f64() })
+                    .collect::<Option<Vec<f64>>>()
             };
             let values = values.iter().map(digits).collect::<Option<_>>().ok_or_else(expected)?;
             let counts = counts.iter().map(Value::as_u64).collect::<Option<_>>().ok_or_else(expected)?;
@@ -142,7 +154,8 @@ impl Shard {
 
     /// The sums, if they are those of `course`.
     pub fn totals(&self, course: &Course) -> Result<Vec<Totals>, MonteCarloError> {
-        let wrong = |message: String| MonteCarloError::Document { path: self.path.clone(), key: "sums".into(), message };
+        let wrong =
+            |message: String| MonteCarloError::Document { path: self.path.clone(), key: "sums".into(), message };
         if self.sums.len() != course.axes.len() {
             return Err(wrong(format!("found {} axes, expected {}", self.sums.len(), course.axes.len())));
         }

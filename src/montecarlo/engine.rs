@@ -35,7 +35,14 @@ impl Course {
             .fold(
                 || (zero(), self.axes.iter().map(|_| None).collect::<Vec<Option<Scratch>>>()),
                 |(mut totals, mut scratch), &(number, first)| {
-                    self.group(number, first, &runs, &mut totals[number as usize], &mut scratch[number as usize], progress);
+                    self.group(
+                        number,
+                        first,
+                        &runs,
+                        &mut totals[number as usize],
+                        &mut scratch[number as usize],
+                        progress,
+                    );
                     (totals, scratch)
                 },
             )

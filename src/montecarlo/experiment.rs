@@ -29,9 +29,11 @@ impl Experiment {
     /// Checks and prepares everything that does not depend on the random numbers.
     pub fn course(&self) -> Result<Course, MonteCarloError> {
         check(self.steps, self.alpha)?;
-        let settling = self.design.axes.iter().max_by(|a, b| {
-            a.steady_state.settling_time.total_cmp(&b.steady_state.settling_time)
-        });
+        let settling = self
+            .design
+            .axes
+            .iter()
+            .max_by(|a, b| a.steady_state.settling_time.total_cmp(&b.steady_state.settling_time));
         let duration = self.steps as f64 / self.design.sample_rate_hz;
         if let Some(axis) = settling.filter(|axis| axis.steady_state.settling_time > duration) {
             let settling_s = axis.steady_state.settling_time;
@@ -110,9 +112,9 @@ impl Experiment {
             FilterDesign::from_json(&filter.to_string(), "filter").map_err(|e| nested("filter", e.to_string()))?;
         let truth = match value.get("truth") {
             None | Some(Value::Null) => None,
-            Some(truth) => Some(
-                Params::from_json(&truth.to_string(), "truth").map_err(|e| nested("truth", e.to_string()))?,
-            ),
+            Some(truth) => {
+                Some(Params::from_json(&truth.to_string(), "truth").map_err(|e| nested("truth", e.to_string()))?)
+            }
         };
         Ok(Experiment {
             design,

@@ -250,7 +250,11 @@ impl LeastLaw {
         let (mut low, mut high) = (0.0, 1.0);
         for _ in 0..200 {
             let middle = 0.5 * (low + high);
-            if self.cdf(middle) < p { low = middle } else { high = middle }
+            if self.cdf(middle) < p {
+                low = middle
+            } else {
+                high = middle
+            }
             if high - low <= 1e-14 * high {
                 break;
             }

@@ -123,7 +123,8 @@ impl Law {
     fn chain(&self, rng: &mut ChaCha8Rng) -> Drawn {
         let n = self.states;
         let others = self.runs - 1;
-        let mut drawn = Drawn { nees: Vec::with_capacity(self.links.len()), mean_error: Vec::with_capacity(self.links.len()) };
+        let mut drawn =
+            Drawn { nees: Vec::with_capacity(self.links.len()), mean_error: Vec::with_capacity(self.links.len()) };
         let mut mean = vec![0.0; n];
         // columns of n numbers
         let mut rest: Vec<f64> = Vec::new();
@@ -219,10 +220,14 @@ impl ChannelLaw {
     /// Raw p-values: NIS, innovation mean, autocorrelation, Ljung-Box, cumulative periodogram, low frequency.
     fn draw(&self, raw: &Raw<'_>, runs: u64, rng: &mut ChaCha8Rng) -> [f64; 6] {
         let mut power = 0.0;
-        let mut powers: Vec<f64> = self.blocks.iter().map(|law| {
-            power += law.sample(rng);
-            power
-        }).collect();
+        let mut powers: Vec<f64> = self
+            .blocks
+            .iter()
+            .map(|law| {
+                power += law.sample(rng);
+                power
+            })
+            .collect();
         powers.reverse();
         let finest = powers.first().map_or(0.0, |q| {
             let freedom = self.shared * (runs * self.channel.updates) as f64;

@@ -18,6 +18,7 @@ pub mod gate;
 mod lanes;
 mod law;
 pub mod outcome;
+pub mod power;
 mod sentences;
 mod spread;
 pub mod sums;
@@ -134,6 +135,7 @@ pub fn conclude(course: &Course, totals: &[Totals], runs: Range<u64>, gate: &Gat
         seed: course.seed,
         critical_p_value: gate.critical,
         false_alarm_rate: None,
+        detects: Vec::new(),
         tests,
         axes,
     };

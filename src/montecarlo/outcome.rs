@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::calibration::FalseAlarmRate;
+use super::power::Detectable;
 use crate::consistency::{Test, Verdict};
 
 /// Runs `first`, `first` + 1, …, `end` − 1.
@@ -37,6 +38,8 @@ pub struct Outcome {
     /// Measured; absent where it was not asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub false_alarm_rate: Option<FalseAlarmRate>,
+    /// Mistuning that the gate sees with 90 % probability, of the design as it is.
+    pub detects: Vec<Detectable>,
     /// Adjusted p-values are family-wise.
     pub tests: Vec<Test>,
     pub axes: Vec<AxisOutcome>,
@@ -60,6 +63,8 @@ pub struct AxisOutcome {
 pub struct NeesCurve {
     pub time_s: Vec<f64>,
     pub mean: Vec<f64>,
+    /// What it is on average with this truth, by covariance analysis.
+    pub expected: Vec<f64>,
     /// The whole curve lies in [lower, upper] unless the gate rejects: a simultaneous band at the critical p-value.
     pub lower: f64,
     pub upper: f64,
@@ -69,6 +74,8 @@ pub struct NeesCurve {
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct NeesAverage {
     pub mean: f64,
+    /// What it is on average with this truth.
+    pub expected: f64,
     pub lower: f64,
     pub upper: f64,
     /// Independent errors that one run is worth, from the filter's own closed-loop transitions.
@@ -111,6 +118,8 @@ pub struct Innovations {
     pub updates: u64,
     /// Mean square.
     pub nis: f64,
+    /// What it is on average with this truth.
+    pub expected_nis: f64,
     pub mean: f64,
     /// Lags 1, 2, …
     pub autocorrelation: Vec<f64>,

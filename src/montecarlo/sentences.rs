@@ -20,7 +20,9 @@ pub(super) fn nees(value: f64, bounds: [f64; 2], time_s: f64) -> String {
     let time = digits(time_s);
     match side(value, bounds) {
         Some(true) => format!("optimistic: at {time} s the errors are {ratio} times as large as the covariance says"),
-        Some(false) => format!("pessimistic: at {time} s the errors are only {ratio} times as large as the covariance says"),
+        Some(false) => {
+            format!("pessimistic: at {time} s the errors are only {ratio} times as large as the covariance says")
+        }
         None => "at all times the errors are as large as the covariance says".into(),
     }
 }
@@ -37,7 +39,10 @@ pub(super) fn nees_average(value: f64, bounds: [f64; 2], effective: f64) -> Stri
 
 pub(super) fn mean_error(outside: bool, time_s: f64) -> String {
     if outside {
-        format!("at {} s the errors are not zero on average: a wrong x0, or something drives the filter off", digits(time_s))
+        format!(
+            "at {} s the errors are not zero on average: a wrong x0, or something drives the filter off",
+            digits(time_s)
+        )
     } else {
         "the errors are zero on average at all times".into()
     }
@@ -62,7 +67,10 @@ pub(super) fn innovation_mean(value: f64, bound: f64) -> String {
 
 pub(super) fn autocorrelation(value: f64, bound: f64, lag: usize, lag_s: f64) -> String {
     if value.abs() > bound {
-        format!("innovations are correlated, most at lag {lag} ({} s): the model misses something that fast", digits(lag_s))
+        format!(
+            "innovations are correlated, most at lag {lag} ({} s): the model misses something that fast",
+            digits(lag_s)
+        )
     } else {
         "no lag is correlated beyond chance".into()
     }
@@ -88,8 +96,12 @@ pub(super) fn cumulative_periodogram(distance: f64, bound: f64, period_s: f64, s
 pub(super) fn low_frequency(value: f64, bounds: [f64; 2], seconds: f64) -> String {
     let (ratio, seconds) = (digits(value), digits(seconds));
     match side(value, bounds) {
-        Some(true) => format!("optimistic about slow drift: averaged over {seconds} s the innovations have {ratio} times the power that the filter says"),
-        Some(false) => format!("pessimistic about slow drift: averaged over {seconds} s the innovations have only {ratio} times the power that the filter says"),
+        Some(true) => format!(
+            "optimistic about slow drift: averaged over {seconds} s the innovations have {ratio} times the power that the filter says"
+        ),
+        Some(false) => format!(
+            "pessimistic about slow drift: averaged over {seconds} s the innovations have only {ratio} times the power that the filter says"
+        ),
         None => "slow innovations are as large as the filter says".into(),
     }
 }
@@ -109,5 +121,11 @@ pub(super) fn verdict(outcome: &Outcome) -> String {
         _ => "the filter is optimistic in one respect and pessimistic in another",
     };
     let count = outcome.tests.len();
-    format!("{tendency}: {} of {count} tests fail, first of all {} of axis {}: {}", failed.len(), worst.name, worst.axis, worst.meaning)
+    format!(
+        "{tendency}: {} of {count} tests fail, first of all {} of axis {}: {}",
+        failed.len(),
+        worst.name,
+        worst.axis,
+        worst.meaning
+    )
 }

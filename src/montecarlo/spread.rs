@@ -1,8 +1,8 @@
 //! Truths drawn from what an identification leaves open: a design is judged over the sensors it may meet.
 
+use super::MonteCarloError;
 use super::course::model_of;
 use super::lanes::PARAMETERS;
-use super::MonteCarloError;
 use crate::filter::FilterDesign;
 use crate::model::LinearModel;
 use crate::numerics::random::{StreamId, normal, stream};

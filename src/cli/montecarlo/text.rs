@@ -2,11 +2,13 @@
 
 use crate::cli::output::{digits, table};
 use crate::montecarlo::calibration::{FalseAlarmRate, Method};
+use crate::montecarlo::power::{Detectable, Measure, Needed, Sighting};
 use crate::montecarlo::{AxisOutcome, Outcome};
 
 pub(super) const TESTS: [&str; 9] =
     ["axis", "test", "statistic", "lower", "upper", "p", "family-wise p", "result", "meaning"];
-pub(super) const AXES: [&str; 7] = ["axis", "NEES over time", "NIS", "NCI", "inclination", "within 1, 2, 3 sigma", "meaning"];
+pub(super) const AXES: [&str; 7] =
+    ["axis", "NEES over time", "NIS", "NCI", "inclination", "within 1, 2, 3 sigma", "meaning"];
 
 pub(super) fn outcome(outcome: &Outcome) -> String {
     let mut text = format!("{}\n\n", experiment(outcome));
@@ -47,6 +49,54 @@ pub(super) fn false_alarms(outcome: &Outcome, rate: &FalseAlarmRate) -> String {
         digits(100.0 * rate.interval[1]),
         rate.replicates,
         digits(100.0 * outcome.alpha)
+    )
+}
+
+pub(super) const POWER: [&str; 6] = ["axis", "parameter", "too large", "seen by", "too small", "seen by"];
+
+/// What the gate sees.
+pub(super) fn power(outcome: &Outcome) -> String {
+    let caption = "Caught with 90 % probability: the filter's value over the true one (x0: in sigmas of P0)";
+    format!("{caption}\n{}\n", table(&POWER, &power_rows(outcome)))
+}
+
+pub(super) fn power_rows(outcome: &Outcome) -> Vec<Vec<String>> {
+    let cell = |sighting: &Option<Sighting>, measure: Measure| match sighting {
+        None => ["not seen".to_string(), String::new()],
+        Some(Sighting { size, test, confirmed }) => {
+            let size = match measure {
+                // close to one the digits behind it are what matters
+                Measure::Factor if (size - 1.0).abs() < 0.01 => format!("x {size:.5}"),
+                Measure::Factor => format!("x {}", digits(*size)),
+                Measure::Sigmas => format!("{size:+.3} sigma"),
+            };
+            let counted = confirmed.map_or_else(String::new, |c| format!(" ({} of {} caught)", c.caught, c.of));
+            [size, format!("{test}{counted}")]
+        }
+    };
+    let row = |d: &Detectable| {
+        let [large, by_large] = cell(&d.too_large, d.measure);
+        let [small, by_small] = cell(&d.too_small, d.measure);
+        vec![d.axis.clone(), d.parameter.clone(), large, by_large, small, by_small]
+    };
+    outcome.detects.iter().map(row).collect()
+}
+
+/// Runs or duration for a wished sensitivity.
+pub(super) fn plan(outcome: &Outcome, wished: &str, needed: &Needed) -> String {
+    let duration = digits(outcome.duration_s);
+    let runs = needed.runs.map_or_else(
+        || "no number of runs up to 100 million".to_string(),
+        |(runs, kind)| format!("{runs} runs of {duration} s ({kind})"),
+    );
+    let longer = needed.duration.map_or_else(
+        || format!("{} runs of no duration that was tried", outcome.runs.count()),
+        |(seconds, kind)| format!("{} runs of {} s ({kind})", outcome.runs.count(), digits(seconds)),
+    );
+    let now = digits(100.0 * needed.power.probability);
+    format!(
+        "To see {wished} with 90 % probability: {runs}, or {longer}; this experiment sees it with {now} % ({})\n",
+        needed.power.kind
     )
 }
 

@@ -42,15 +42,14 @@ def main():
     if not 1 <= known.shards <= known.runs:
         parser.error("1 <= shards <= runs is needed")
 
-    ray.init()  # the cluster of $RAY_ADDRESS, else this machine
     folder = os.getcwd()
     arguments = [os.path.abspath(known.filter), "--threads", str(known.threads), *options]
     task = run_shard.options(num_cpus=known.threads)
     bounds = [known.runs * shard // known.shards for shard in range(known.shards + 1)]
-    shards = [task.remote(folder, i, bounds[i], bounds[i + 1], arguments) for i in range(known.shards)]
     try:
-        files = ray.get(shards)
-    except ray.exceptions.RayError as error:
+        ray.init()  # the cluster of $RAY_ADDRESS, else this machine
+        files = ray.get([task.remote(folder, i, bounds[i], bounds[i + 1], arguments) for i in range(known.shards)])
+    except (ray.exceptions.RayError, ConnectionError) as error:
         print(getattr(error, "cause", error), file=sys.stderr)
         return 2
     merge = ["kfdesign", "merge", *files, "-o", "montecarlo.json", "--junit", "montecarlo.xml", "--report", "montecarlo.html"]

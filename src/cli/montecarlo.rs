@@ -99,8 +99,8 @@ struct Outputs {
     /// Print what the gate would see: the smallest mistuning of every parameter that is caught with 90 % probability
     #[arg(long)]
     power: bool,
-    /// With --power: simulate each of these sizes this many times and count
-    #[arg(long, default_value_t = 0, value_name = "N", requires = "power")]
+    /// Simulate each of these sizes, and the given truth, in this many whole experiments and count what is caught
+    #[arg(long, default_value_t = 0, value_name = "N")]
     confirm: u64,
     /// How many runs, or how long ones, see this mistuning: \"gauss_markov.std_dev x1.3\" (the filter's value is 1.3 times the true one)
     #[arg(long, value_name = "\"PARAMETER xFACTOR\"")]
@@ -310,6 +310,18 @@ impl Outputs {
                 rate
             }
         });
+        if experiment.truth.is_some() && !experiment.truth_spread {
+            outcome.rejection = power::rejection(course, &gate, count);
+            if let Some(rejection) = outcome.rejection.as_mut().filter(|_| self.confirm > 0) {
+                let bar = progress(self.confirm * count * course.axes.len() as u64, "confirm");
+                let caught =
+                    calibration::caught_of_experiments(course, &gate.axes, gate.critical, count, self.confirm, &|n| {
+                        bar.inc(n)
+                    });
+                bar.finish_and_clear();
+                rejection.confirmed = Some(caught);
+            }
+        }
         let mut planned = String::new();
         if experiment.truth.is_none() || self.power || !self.plan.is_empty() {
             planned = self.look(experiment, course, &gate, &mut outcome)?;

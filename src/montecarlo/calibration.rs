@@ -106,10 +106,10 @@ pub struct Caught {
     pub of: u64,
 }
 
-/// Whole experiments on one axis: how often some test has a p-value of at most `critical`.
+/// Whole experiments: how often some test of some axis has a p-value of at most `critical`; `gates`: one per axis of `course`.
 pub fn caught_of_experiments(
     course: &Course,
-    gate: &AxisGate,
+    gates: &[AxisGate],
     critical: f64,
     runs: u64,
     experiments: u64,
@@ -118,8 +118,8 @@ pub fn caught_of_experiments(
     let failed = |experiment: &u64| {
         let first = FIRST_RUN + experiment * runs.next_multiple_of(4);
         let totals = course.sums(first..first + runs, progress);
-        let mut axes = course.axes.iter().zip(&totals);
-        axes.any(|(axis, totals)| {
+        let mut axes = course.axes.iter().zip(&totals).zip(gates);
+        axes.any(|((axis, totals), gate)| {
             let raw = conclusion::raw_p_values(axis, totals, runs);
             // a p-value that is not a number is no pass
             gate.p_values(&raw).into_iter().any(|p| !(p > critical))

@@ -82,6 +82,7 @@ pub fn partial_json(experiment: &Experiment, course: &Course, runs: Runs, totals
         seed: experiment.seed,
         critical_p_value: f64::NAN,
         false_alarm_rate: None,
+        rejection: None,
         detects: Vec::new(),
         tests: Vec::new(),
         axes: Vec::new(),

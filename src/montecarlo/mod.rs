@@ -135,6 +135,7 @@ pub fn conclude(course: &Course, totals: &[Totals], runs: Range<u64>, gate: &Gat
         seed: course.seed,
         critical_p_value: gate.critical,
         false_alarm_rate: None,
+        rejection: None,
         detects: Vec::new(),
         tests,
         axes,

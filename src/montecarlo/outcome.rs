@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::calibration::FalseAlarmRate;
-use super::power::Detectable;
+use super::power::{Detectable, Rejection};
 use crate::consistency::{Test, Verdict};
 
 /// Runs `first`, `first` + 1, …, `end` − 1.
@@ -38,6 +38,9 @@ pub struct Outcome {
     /// Measured; absent where it was not asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub false_alarm_rate: Option<FalseAlarmRate>,
+    /// How surely this gate rejects the given truth; absent when the design is its own truth, or the truth is drawn.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rejection: Option<Rejection>,
     /// Mistuning that the gate sees with 90 % probability, of the design as it is.
     pub detects: Vec<Detectable>,
     /// Adjusted p-values are family-wise.

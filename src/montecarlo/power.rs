@@ -321,6 +321,30 @@ pub fn detectable(experiment: &Experiment, own: &Course, gate: &Gate, runs: u64)
     (0..own.axes.len()).flat_map(of_axis).collect()
 }
 
+/// How surely the gate rejects the truth that was given.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Rejection {
+    /// Predicted probability, that of the most powerful test: at least this.
+    pub probability: f64,
+    pub axis: String,
+    pub test: String,
+    /// By simulation, where it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub confirmed: Option<Caught>,
+}
+
+/// Power of the gate of `course` against the course's own truth.
+pub fn rejection(course: &Course, gate: &Gate, runs: u64) -> Option<Rejection> {
+    let of_axis = |number: usize| {
+        let instrument = Instrument::new(course, gate, number, runs);
+        let axis = &course.axes[number];
+        let power = instrument.power(&instrument.expectation(&axis.truth));
+        let test = test_name(axis, power.kind);
+        Rejection { probability: power.probability, axis: axis.name.clone(), test, confirmed: None }
+    };
+    (0..course.axes.len()).map(of_axis).max_by(|a, b| a.probability.total_cmp(&b.probability))
+}
+
 /// Simulates the found sizes of axis `number` with `experiments` whole experiments each and counts what the gate catches.
 pub fn confirm(
     experiment: &Experiment,
@@ -340,8 +364,14 @@ pub fn confirm(
                 let truth = what.truth(experiment, number, sighting.size)?;
                 let course = AxisCourse::new(&experiment.design.axes[number], truth, None, own.steps)?;
                 let course = Course { axes: vec![course], ..own.clone() };
-                let caught =
-                    caught_of_experiments(&course, &gate.axes[number], gate.critical, runs, experiments, progress);
+                let caught = caught_of_experiments(
+                    &course,
+                    &gate.axes[number..=number],
+                    gate.critical,
+                    runs,
+                    experiments,
+                    progress,
+                );
                 sighting.confirmed = Some(caught);
             }
         }

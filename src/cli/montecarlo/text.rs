@@ -2,7 +2,7 @@
 
 use crate::cli::output::{digits, table};
 use crate::montecarlo::calibration::{FalseAlarmRate, Method};
-use crate::montecarlo::power::{Detectable, Measure, Needed, Sighting};
+use crate::montecarlo::power::{Detectable, Measure, Needed, Rejection, Sighting};
 use crate::montecarlo::{AxisOutcome, Outcome};
 
 pub(super) const TESTS: [&str; 9] =
@@ -16,6 +16,9 @@ pub(super) fn outcome(outcome: &Outcome) -> String {
     text.push_str(&format!("\nTests: bounds at {} %, each alone\n", digits(100.0 * (1.0 - outcome.alpha))));
     text.push_str(&table(&TESTS, &test_rows(outcome)));
     text.push('\n');
+    if let Some(rejection) = &outcome.rejection {
+        text.push_str(&format!("{}\n", rejected(rejection)));
+    }
     if let Some(rate) = &outcome.false_alarm_rate {
         text.push_str(&format!("{}\n", false_alarms(outcome, rate)));
     }
@@ -33,6 +36,18 @@ pub(super) fn experiment(outcome: &Outcome) -> String {
         digits(outcome.duration_s),
         outcome.steps,
         outcome.seed
+    )
+}
+
+/// How surely the given truth is told from the design.
+pub(super) fn rejected(rejection: &Rejection) -> String {
+    let counted =
+        rejection.confirmed.map_or_else(String::new, |c| format!("; {} of {} experiments did", c.caught, c.of));
+    format!(
+        "This gate rejects this truth with a probability of at least {} % ({} of axis {}){counted}",
+        digits(100.0 * rejection.probability),
+        rejection.test,
+        rejection.axis
     )
 }
 

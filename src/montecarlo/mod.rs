@@ -109,6 +109,11 @@ pub fn verify_against(
         let names = |d: &FilterDesign| d.axes.iter().map(|a| a.name.as_str()).collect::<Vec<_>>().join(", ");
         return Err(MonteCarloError::Axes { truth: names(truth), filter: names(design) });
     }
+    if design.sample_rate_hz != truth.sample_rate_hz {
+        let rate = |d: &FilterDesign| format!("a sample rate of {} Hz", d.sample_rate_hz);
+        let axis = design.axes.first().map_or_else(String::new, |axis| axis.name.clone());
+        return Err(MonteCarloError::Mismatch { axis, truth: rate(truth), filter: rate(design) });
+    }
     let course = experiment::course_of(design, course::own_models(truth), plan.steps, plan.seed)?;
     let totals = course.sums(0..plan.runs, progress);
     let gate = calibration::gate(&course, plan.runs, plan.alpha, QUICK_REPLICATES);

@@ -45,7 +45,10 @@ pub enum Method {
 pub struct TestRate {
     pub axis: String,
     pub name: String,
+    /// Share of the replicates in which this test alone would reject at level alpha.
     pub value: f64,
+    /// Share in which its p-value was at or below the critical one.
+    pub rejected: f64,
 }
 
 /// Interval of a probability after `hits` of `trials`: Wilson's score interval.
@@ -122,7 +125,7 @@ pub fn caught_of_experiments(
         axes.any(|((axis, totals), gate)| {
             let raw = conclusion::raw_p_values(axis, totals, runs);
             // a p-value that is not a number is no pass
-            gate.p_values(&raw).into_iter().any(|p| !(p > critical))
+            gate.p_values(&raw).into_iter().any(|p| p.is_nan() || p <= critical)
         })
     };
     Caught { caught: (0..experiments).filter(failed).count() as u64, of: experiments }
@@ -135,14 +138,16 @@ fn rate(
     method: Method,
     raw: impl Fn(u64) -> Vec<Vec<f64>>,
 ) -> FalseAlarmRate {
-    let mut alone: Vec<Vec<u64>> = gate.axes.iter().map(|axis| vec![0; axis.kinds.len()]).collect();
+    let mut alone: Vec<Vec<[u64; 2]>> = gate.axes.iter().map(|axis| vec![[0; 2]; axis.kinds.len()]).collect();
     let mut hits = 0;
     for replicate in 0..replicates {
         let mut failed = false;
         for ((axis, raw), alone) in gate.axes.iter().zip(raw(replicate)).zip(&mut alone) {
             for (p, count) in axis.p_values(&raw).into_iter().zip(alone) {
-                failed |= p <= gate.critical;
-                *count += u64::from(p <= gate.alpha);
+                let rejected = p <= gate.critical;
+                failed |= rejected;
+                count[0] += u64::from(p <= gate.alpha);
+                count[1] += u64::from(rejected);
             }
         }
         hits += u64::from(failed);
@@ -152,7 +157,8 @@ fn rate(
         gate.kinds.iter().zip(alone).map(|(kind, count)| TestRate {
             axis: axis.name.clone(),
             name: conclusion::test_name(axis, *kind),
-            value: *count as f64 / total as f64,
+            value: count[0] as f64 / total as f64,
+            rejected: count[1] as f64 / total as f64,
         })
     });
     FalseAlarmRate {

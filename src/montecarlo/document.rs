@@ -193,7 +193,7 @@ impl Shard {
 
 /// Key and values of the first difference.
 fn difference(a: &Value, b: &Value, key: &str) -> Option<(String, String, String)> {
-    let inside = match (a, b) {
+    match (a, b) {
         (Value::Object(x), Value::Object(y)) => {
             let keys = x.keys().chain(y.keys().filter(|key| !x.contains_key(*key)));
             let null = Value::Null;
@@ -206,8 +206,7 @@ fn difference(a: &Value, b: &Value, key: &str) -> Option<(String, String, String
         }
         _ if a == b => None,
         _ => Some((key.to_string(), short(a), short(b))),
-    };
-    inside
+    }
 }
 
 fn short(value: &Value) -> String {

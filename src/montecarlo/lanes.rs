@@ -190,9 +190,9 @@ impl ChannelSums {
     fn absorb(&mut self, base: u64, histogram: &mut [&mut [u32]; LANES]) {
         let fresh = &self.y[self.lags..];
         for y in fresh {
-            for l in 0..LANES {
-                self.sum[l] += y[l];
-                self.squares[l] += y[l] * y[l];
+            for ((sum, squares), y) in self.sum.iter_mut().zip(&mut self.squares).zip(y) {
+                *sum += y;
+                *squares += y * y;
             }
         }
         for (h, product) in self.products.iter_mut().enumerate() {
@@ -208,17 +208,17 @@ impl ChannelSums {
             }
         }
         for y in fresh {
-            for l in 0..LANES {
-                let bin = (y[l] * y[l] / NIS_BIN) as usize;
-                histogram[l][bin.min(NIS_BINS)] += 1;
+            for (counts, y) in histogram.iter_mut().zip(y) {
+                let bin = (y * y / NIS_BIN) as usize;
+                counts[bin.min(NIS_BINS)] += 1;
             }
         }
         let mut rest = fresh;
         while !rest.is_empty() {
             let (some, later) = rest.split_at(rest.len().min((base - self.filled) as usize));
             for y in some {
-                for l in 0..LANES {
-                    self.block[l] += y[l];
+                for (block, y) in self.block.iter_mut().zip(y) {
+                    *block += y;
                 }
             }
             self.filled += some.len() as u64;
@@ -377,11 +377,10 @@ pub(super) fn simulate<O: Observer>(
                         z[l] += h[l] * x[l];
                     }
                 }
-                let mut innovation = [0.0; LANES];
                 for l in 0..LANES {
                     z[l] += truth.root_r[c][l] * draw[l];
-                    innovation[l] = z[l];
                 }
+                let mut innovation = z;
                 for (h, x) in h[c].iter().zip(estimate.iter()) {
                     for l in 0..LANES {
                         innovation[l] -= h * x[l];

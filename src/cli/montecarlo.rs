@@ -301,7 +301,7 @@ impl Outputs {
         let gate = calibration::gate(course, count, experiment.alpha, REPLICATES);
         let mut outcome = conclude(course, totals, runs, &gate);
         outcome.false_alarm_rate = Some(match experiment.replicates {
-            0 => calibration::false_alarms(course, &gate, count, REPLICATES),
+            0 => calibration::false_alarms(course, &gate, count),
             replicates => {
                 let bar = progress(replicates * count * course.axes.len() as u64, "false alarms");
                 let own = experiment.own_course()?;

@@ -172,16 +172,6 @@ impl AxisCourse {
     pub(super) fn layout(&self) -> &Layout {
         &self.layout
     }
-
-    /// Updates of all measurements in a run.
-    pub fn updates(&self) -> u64 {
-        self.channels.iter().map(|c| c.updates).sum()
-    }
-
-    /// The same axis with the design itself as the truth: what the null law of the gate belongs to.
-    pub fn claimed(&self, epoch: usize) -> DMatrix<f64> {
-        self.judge.claimed(&self.gains.epochs[epoch].covariance)
-    }
 }
 
 impl EpochCourse {

@@ -1,5 +1,6 @@
 //! Figures and pages. `KFDESIGN_GALLERY=DIR cargo test report::` writes them to DIR, to be looked at.
 
+mod montecarlo;
 mod records;
 
 use kfdesign::consistency::Verdict;
@@ -186,6 +187,7 @@ fn nees_data() -> Nees {
         lower: vec![1.484; 500],
         upper: vec![2.591; 500],
         expected: 2.0,
+        under_truth: None,
         band_label: "95 % at one time".into(),
     }
 }
@@ -198,7 +200,43 @@ fn nees_at_five_times() -> Nees {
         lower: vec![0.74; 5],
         upper: vec![1.29; 5],
         expected: 1.0,
+        under_truth: None,
         band_label: "95 % at one time".into(),
+    }
+}
+
+fn error_data() -> Errors {
+    let mut noise = Normals(10);
+    let path = |noise: &mut Normals| {
+        let mut error = 0.0;
+        let step = |i: u32| {
+            error = 0.9 * error + 0.003 * noise.next();
+            (f64::from(i), error)
+        };
+        Curve { label: String::new(), points: (0..600).map(step).collect() }
+    };
+    Errors {
+        title: "gyro_x: error of bias".into(),
+        quantity: "error of bias".into(),
+        unit: "deg/s".into(),
+        sigma: (0..600).map(|i| (f64::from(i), 0.007 + 0.5 / (1.0 + 9.0 * f64::from(i)))).collect(),
+        runs: (0..4).map(|_| path(&mut noise)).collect(),
+        label: "runs 0 to 3".into(),
+    }
+}
+
+fn rms_data() -> Rms {
+    let claims = sigma_data();
+    let component = |(k, state): (usize, &SigmaState)| Component {
+        name: state.name.clone(),
+        rms: state.sigma.iter().map(|s| s * (1.1 - 0.2 * k as f64)).collect(),
+        claimed: state.sigma.clone(),
+    };
+    Rms {
+        title: "gyro_x: errors and claims".into(),
+        unit: "deg/s".into(),
+        components: claims.states.iter().enumerate().map(component).collect(),
+        time_s: claims.time_s,
     }
 }
 
@@ -214,6 +252,8 @@ fn gallery() -> Vec<(&'static str, String)> {
         ("periodogram", cumulative_periodogram(&periodogram_data())),
         ("nees", nees(&nees_data())),
         ("nees5", nees(&nees_at_five_times())),
+        ("errors", errors(&error_data())),
+        ("rms", rms(&rms_data())),
     ]
 }
 
@@ -243,7 +283,7 @@ fn page() -> Page {
                 )
                 .warning("A gap of 2.4 s at 1312 s was propagated over."),
             Section::new("gyro_x").figures(figures(&["estimate", "innovations", "autocorrelation", "nis", "periodogram"])),
-            Section::new("Design").figures(figures(&["allan", "sigma", "budget", "nees", "nees5"])).list(vec!["One sentence.".into(), "Another sentence.".into()]),
+            Section::new("Design").figures(figures(&["allan", "sigma", "budget", "nees", "nees5", "errors", "rms"])).list(vec!["One sentence.".into(), "Another sentence.".into()]),
         ],
     }
 }
@@ -421,7 +461,7 @@ fn hostile_values_make_a_figure_all_the_same() {
                 estimate: values.clone(),
                 sigma: values.clone(),
                 truth: Some(curve.clone()),
-                measured: Some(curve),
+                measured: Some(curve.clone()),
                 ..Estimate::default()
             }),
             innovations(&Innovations {
@@ -442,7 +482,7 @@ fn hostile_values_make_a_figure_all_the_same() {
                 ..Histogram::default()
             }),
             cumulative_periodogram(&Periodogram {
-                points: pairs,
+                points: pairs.clone(),
                 half_width: values.first().copied().unwrap_or(0.1),
                 ..Periodogram::default()
             }),
@@ -452,7 +492,14 @@ fn hostile_values_make_a_figure_all_the_same() {
                 lower: values.clone(),
                 upper: values.clone(),
                 expected: values.first().copied().unwrap_or(1.0),
+                under_truth: Some(curve.clone()),
                 ..Nees::default()
+            }),
+            errors(&Errors { sigma: pairs.clone(), runs: vec![curve.clone(); 3], ..Errors::default() }),
+            rms(&Rms {
+                time_s: values.clone(),
+                components: vec![Component { name: "s".into(), rms: values.clone(), claimed: values.clone() }],
+                ..Rms::default()
             }),
         ];
         for (number, svg) in figures.iter().enumerate() {
@@ -509,7 +556,7 @@ fn page_is_self_contained() {
     for alien in ["<script", "<link", "@import", "url(", "src=", "href="] {
         assert!(!html.contains(alien), "{alien}");
     }
-    assert_eq!(html.matches("<svg ").count(), 10);
+    assert_eq!(html.matches("<svg ").count(), 12);
     // one style sheet for all figures
     assert_eq!(html.matches("<style>").count(), 1);
     for (verdict, word) in [

@@ -1,7 +1,9 @@
 //! `kfdesign montecarlo` and `kfdesign merge`.
 
+mod sight;
 mod text;
 
+use std::borrow::Cow;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -96,6 +98,9 @@ struct Outputs {
     /// Test report for CI servers
     #[arg(long, value_name = "FILE.xml")]
     junit: Option<PathBuf>,
+    /// Verdict, curves and figures on one page
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
     /// Print what the gate would see: the smallest mistuning of every parameter that is caught with 90 % probability
     #[arg(long)]
     power: bool,
@@ -215,7 +220,10 @@ fn many_runs(args: &Args, experiment: &Experiment, course: &Course) -> anyhow::R
             ),
         }
     }
-    args.outputs.finish(experiment, course, &totals, runs)
+    let truth = args.truth.iter().map(|path| ("truth's parameters".to_string(), path.display().to_string()));
+    let filter = std::iter::once(("filter".to_string(), args.filter.display().to_string()));
+    let sources: Vec<_> = filter.chain(truth).collect();
+    args.outputs.finish(experiment, course, &totals, runs, &sources)
 }
 
 pub(super) fn merge(args: &MergeArgs) -> anyhow::Result<Status> {
@@ -231,7 +239,9 @@ pub(super) fn merge(args: &MergeArgs) -> anyhow::Result<Status> {
     for shard in &shards[1..] {
         totals.iter_mut().zip(shard.totals(&course)?).for_each(|(sum, more)| sum.merge(&more));
     }
-    args.outputs.finish(&experiment, &course, &totals, runs)
+    let names: Vec<&str> = shards.iter().map(|shard| shard.path.as_str()).collect();
+    let sources = [("merged from".to_string(), names.join(", "))];
+    args.outputs.finish(&experiment, &course, &totals, runs, &sources)
 }
 
 /// One run alone, as a table.
@@ -281,7 +291,7 @@ fn one_run(args: &Args, experiment: &Experiment, course: &Course, number: u64) -
 impl Outputs {
     /// No output is an input.
     fn check(&self, inputs: &[&Path]) -> anyhow::Result<()> {
-        for output in [&self.output, &self.junit].into_iter().flatten() {
+        for output in [&self.output, &self.junit, &self.report].into_iter().flatten() {
             for input in inputs {
                 atomic::check_output(output, input)?;
             }
@@ -289,13 +299,14 @@ impl Outputs {
         Ok(())
     }
 
-    /// The verdict on the sums, everywhere it was asked for.
+    /// The verdict on the sums, everywhere it was asked for. `sources`: label and name of the files that were read.
     fn finish(
         &self,
         experiment: &Experiment,
         course: &Course,
         totals: &[Totals],
         runs: Range<u64>,
+        sources: &[(String, String)],
     ) -> anyhow::Result<Status> {
         let count = runs.end - runs.start;
         let gate = calibration::gate(course, count, experiment.alpha, REPLICATES);
@@ -322,9 +333,10 @@ impl Outputs {
                 rejection.confirmed = Some(caught);
             }
         }
+        let detects = experiment.truth.is_none() || self.power;
         let mut planned = String::new();
-        if experiment.truth.is_none() || self.power || !self.plan.is_empty() {
-            planned = self.look(experiment, course, &gate, &mut outcome)?;
+        if detects || !self.plan.is_empty() {
+            planned = self.look(experiment, course, &gate, detects, &mut outcome)?;
         }
         let json = document::to_json(experiment, &outcome, totals);
         if let Some(path) = &self.output {
@@ -332,6 +344,16 @@ impl Outputs {
         }
         if let Some(path) = &self.junit {
             atomic::write(path, junit::report(&outcome)?.as_bytes())?;
+        }
+        if let Some(path) = &self.report {
+            // the page always has the table; what the document holds does not depend on the page
+            let mut seen = outcome.clone();
+            if !detects {
+                let (course, gate) = as_own_truth(experiment, course, &gate, count)?;
+                seen.detects = power::detectable(experiment, &course, &gate, count);
+            }
+            let page = sight::page(&sight::View { experiment, course, outcome: &seen, sources });
+            atomic::write(path, page.to_html()?.as_bytes())?;
         }
         if self.json {
             print_text(&json)?;
@@ -344,27 +366,21 @@ impl Outputs {
 }
 
 impl Outputs {
-    /// What the gate sees when the design is wrong, into the outcome; the plans as text.
+    /// What the gate sees when the design is wrong, into the outcome if `detects` says so; the plans as text.
     fn look(
         &self,
         experiment: &Experiment,
         course: &Course,
         gate: &Gate,
+        detects: bool,
         outcome: &mut Outcome,
     ) -> anyhow::Result<String> {
         let runs = outcome.runs.count();
-        // power is that of the design as its own truth; another truth may be judged by other components
-        let (own, of_own);
-        let (course, gate) = if experiment.truth.is_none() && !experiment.truth_spread {
-            (course, gate)
-        } else {
-            own = experiment.own_course()?;
-            of_own = calibration::gate(&own, runs, experiment.alpha, REPLICATES);
-            (&own, &of_own)
-        };
+        let (course, gate) = as_own_truth(experiment, course, gate, runs)?;
+        let (course, gate) = (course.as_ref(), gate.as_ref());
         let plans: Vec<(usize, Mistuning, f64, &str)> =
             self.plan.iter().map(|text| planned(experiment, course, text)).collect::<Result<_, _>>()?;
-        if experiment.truth.is_none() || self.power {
+        if detects {
             outcome.detects = power::detectable(experiment, course, gate, runs);
         }
         if self.confirm > 0 {
@@ -381,6 +397,21 @@ impl Outputs {
         }
         Ok(text)
     }
+}
+
+/// Course and gate of the design as its own truth: what power is about. Another truth may be judged by other components.
+fn as_own_truth<'a>(
+    experiment: &Experiment,
+    course: &'a Course,
+    gate: &'a Gate,
+    runs: u64,
+) -> anyhow::Result<(Cow<'a, Course>, Cow<'a, Gate>)> {
+    if experiment.truth.is_none() && !experiment.truth_spread {
+        return Ok((Cow::Borrowed(course), Cow::Borrowed(gate)));
+    }
+    let own = experiment.own_course()?;
+    let gate = calibration::gate(&own, runs, experiment.alpha, REPLICATES);
+    Ok((Cow::Owned(own), Cow::Owned(gate)))
 }
 
 /// The axis, what is wrong about it and by how much: `gauss_markov.std_dev x1.3`, with `y:` before it for another axis than the first.

@@ -46,12 +46,13 @@ pub struct Test {
     /// "nis", "whiteness", "ljung_box", "low_frequency", "cumulative_periodogram", "start", "nees", …
     pub name: String,
     pub statistic: f64,
-    /// The statistic lies in [lower, upper] with probability 1 − alpha when the design is true (each test alone).
+    /// replay: the statistic lies in [lower, upper] with probability 1 − alpha when the design is true (each test alone);
+    /// montecarlo: the bounds beyond which the gate rejects, all tests together.
     pub lower: f64,
     pub upper: f64,
     /// Two-sided.
     pub p_value: f64,
-    /// Holm, over all tests and axes of the document.
+    /// Over all tests and axes of the document: Holm (replay), law of the least p-value (montecarlo).
     pub adjusted_p_value: f64,
     pub pass: bool,
     /// A sentence.

@@ -101,10 +101,10 @@ impl<'a> Summary<'a> {
         }
     }
 
-    /// The test of a kind with its single-test bounds at the gate's level.
-    fn test(&self, number: usize, kind: Kind, gate: &AxisGate, alpha: f64) -> Test {
+    /// The test of a kind with the bounds that belong to the p-value `critical`.
+    fn test(&self, number: usize, kind: Kind, gate: &AxisGate, critical: f64) -> Test {
         let p = gate.p_value(number, self.raw_p(kind));
-        let at = gate.raw_for(number, alpha);
+        let at = gate.raw_for(number, critical);
         let dt = self.axis.filter.dt;
         let (mut averaging, n) = (None, self.runs());
         let (statistic, bounds, meaning) = match kind {
@@ -143,9 +143,7 @@ impl<'a> Summary<'a> {
             Kind::Autocorrelation(c) => {
                 let (r, z) = self.lags(c);
                 let worst = lowest(z.iter().map(|z| -z.abs()));
-                let single = -((-at).ln_1p() / z.len() as f64).exp_m1();
-                let pairs = n * (self.axis.channels[c].updates - worst as u64 - 1) as f64;
-                let bound = normal_quantile(1.0 - 0.5 * single) / pairs.sqrt();
+                let bound = self.autocorrelation_bound(c, at, worst as u64 + 1);
                 let lag = (worst + 1) as f64 * self.interval(c);
                 (r[worst], [-bound, bound], sentences::autocorrelation(r[worst], bound, worst + 1, lag))
             }
@@ -187,6 +185,12 @@ impl<'a> Summary<'a> {
     fn averaging(&self, channel: usize, length: usize) -> f64 {
         let c = &self.axis.channels[channel];
         (c.lengths[length] as u64 * c.base) as f64 * self.interval(channel)
+    }
+    /// Autocorrelation at `lag` of one measurement, such that all lags keep theirs with probability 1 − `p`.
+    fn autocorrelation_bound(&self, channel: usize, p: f64, lag: u64) -> f64 {
+        let Channel { lags, updates, .. } = self.axis.channels[channel];
+        let single = -((-p).ln_1p() / lags as f64).exp_m1();
+        normal_quantile(1.0 - 0.5 * single) / (self.runs() * (updates - lag) as f64).sqrt()
     }
     /// Distance that Kolmogorov's law exceeds with probability `p`.
     fn periodogram_bound(&self, channel: usize, p: f64) -> f64 {
@@ -231,8 +235,8 @@ impl<'a> Summary<'a> {
             innovations: (0..self.axis.channels.len())
                 .map(|c| {
                     let bound = |kind| level(&|other| other == kind);
-                    let bounds = [bound(Kind::LowFrequency(c)), bound(Kind::CumulativePeriodogram(c))];
-                    self.innovations(c, expected.innovations[c].nis, bounds)
+                    let kinds = [Kind::Autocorrelation(c), Kind::LowFrequency(c), Kind::CumulativePeriodogram(c)];
+                    self.innovations(c, expected.innovations[c].nis, kinds.map(bound))
                 })
                 .collect(),
         }
@@ -278,7 +282,9 @@ impl<'a> Summary<'a> {
         }
     }
 
-    fn innovations(&self, c: usize, expected_nis: f64, [low_frequency, periodogram]: [f64; 2]) -> Innovations {
+    /// `levels`: raw p-values at which autocorrelation, low-frequency power and cumulative periodogram are rejected.
+    fn innovations(&self, c: usize, expected_nis: f64, levels: [f64; 3]) -> Innovations {
+        let [autocorrelation, low_frequency, periodogram] = levels;
         let channel = &self.axis.channels[c];
         let powers = self.powers(c);
         let averages = powers.iter().zip(&channel.lengths).enumerate().map(|(i, (power, length))| {
@@ -306,6 +312,7 @@ impl<'a> Summary<'a> {
             expected_nis,
             mean: self.innovation_mean(c),
             autocorrelation: self.lags(c).0,
+            autocorrelation_bound: self.autocorrelation_bound(c, autocorrelation, 1),
             low_frequency: averages.collect(),
             cumulative_periodogram: Periodogram {
                 frequency_hz: (1..=ordinates.len()).map(|j| j as f64 / span).collect(),
@@ -363,7 +370,7 @@ pub(super) fn conclude(
     let summary = Summary::new(axis, totals, runs);
     let own = &gate.axes[number];
     let tests = own.kinds.iter().enumerate().map(|(i, kind)| {
-        let mut test = summary.test(i, *kind, own, gate.alpha);
+        let mut test = summary.test(i, *kind, own, gate.critical);
         test.adjusted_p_value = gate.family(test.p_value);
         test.pass = test.p_value > gate.critical;
         test

@@ -120,6 +120,49 @@ impl Course {
         };
         (0..).zip(&self.axes).map(|(number, axis)| one(number, axis)).collect()
     }
+
+    /// Four runs, `first` and those after it, at every `every`-th step: what a figure needs, however long a run is. By axis, then by run.
+    pub fn paths(&self, first: u64, every: u64) -> Vec<Vec<Path>> {
+        let one = |number: u32, axis: &AxisCourse| {
+            let mut paths = Paths { every: every.max(1), runs: std::array::from_fn(|_| Path::new(axis)) };
+            let numbers: [u64; LANES] = std::array::from_fn(|l| first.saturating_add(l as u64));
+            let drawn = self.drawn(number, numbers);
+            let truth = drawn.as_ref().unwrap_or(&axis.nominal);
+            simulate(axis, number, truth, self.seed, numbers, &mut Scratch::new(axis), &mut paths);
+            Vec::from(paths.runs)
+        };
+        (0..).zip(&self.axes).map(|(number, axis)| one(number, axis)).collect()
+    }
+}
+
+/// States of one run of one axis, state by state.
+#[derive(Clone, Debug, Default)]
+pub struct Path {
+    pub truth: Vec<Vec<f64>>,
+    pub estimate: Vec<Vec<f64>>,
+}
+
+impl Path {
+    fn new(axis: &AxisCourse) -> Path {
+        Path { truth: vec![Vec::new(); axis.truth.x0.len()], estimate: vec![Vec::new(); axis.filter.x0.len()] }
+    }
+}
+
+struct Paths {
+    every: u64,
+    runs: [Path; LANES],
+}
+
+impl Observer for Paths {
+    fn step(&mut self, step: u64, truth: &[Lane], estimate: &[Lane]) {
+        if !step.is_multiple_of(self.every) {
+            return;
+        }
+        for (l, path) in self.runs.iter_mut().enumerate() {
+            let columns = path.truth.iter_mut().zip(truth).chain(path.estimate.iter_mut().zip(estimate));
+            columns.for_each(|(column, value)| column.push(value[l]));
+        }
+    }
 }
 
 /// Every number of one run of one axis, by steps.

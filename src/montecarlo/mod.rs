@@ -25,7 +25,7 @@ pub mod sums;
 
 use std::ops::Range;
 
-pub use engine::{Course, Trace};
+pub use engine::{Course, Path, Trace};
 pub use experiment::Experiment;
 pub use outcome::{AxisOutcome, Outcome, Runs};
 pub use sums::Totals;

@@ -126,6 +126,8 @@ pub struct Innovations {
     pub mean: f64,
     /// Lags 1, 2, …
     pub autocorrelation: Vec<f64>,
+    /// No lag is beyond ± this unless the gate rejects.
+    pub autocorrelation_bound: f64,
     pub low_frequency: Vec<LowFrequency>,
     pub cumulative_periodogram: Periodogram,
     pub nis_histogram: Histogram,

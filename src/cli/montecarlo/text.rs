@@ -13,7 +13,7 @@ pub(super) const AXES: [&str; 7] =
 pub(super) fn outcome(outcome: &Outcome) -> String {
     let mut text = format!("{}\n\n", experiment(outcome));
     text.push_str(&table(&AXES, &axis_rows(outcome)));
-    text.push_str(&format!("\nTests: bounds at {} %, each alone\n", digits(100.0 * (1.0 - outcome.alpha))));
+    text.push_str(&format!("\nTests: a true filter keeps within all bounds with {} %\n", kept(outcome)));
     text.push_str(&table(&TESTS, &test_rows(outcome)));
     text.push('\n');
     if let Some(rejection) = &outcome.rejection {
@@ -24,6 +24,11 @@ pub(super) fn outcome(outcome: &Outcome) -> String {
     }
     text.push_str(&format!("{}: {}\n", outcome.verdict.word(), outcome.meaning));
     text
+}
+
+/// Probability in % that a true filter passes.
+pub(super) fn kept(outcome: &Outcome) -> String {
+    digits(100.0 * (1.0 - outcome.alpha))
 }
 
 /// What was run.

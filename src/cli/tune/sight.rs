@@ -52,7 +52,7 @@ pub(super) fn page(view: &View<'_>, replay: Option<&ReplayResult>) -> Page {
             )
             .table(
                 format!(
-                    "Tests: bounds at {} %, each alone; p adjusted for all {} tests (Holm)",
+                    "Tests: a true filter keeps within all bounds with {} %; p adjusted for all {} tests",
                     digits(100.0 * (1.0 - outcome.alpha)),
                     outcome.tests.len()
                 ),
@@ -133,6 +133,7 @@ fn nees(axis: &AxisOutcome, outcome: &Outcome) -> String {
         lower: vec![axis.nees.lower; axis.nees.time_s.len()],
         upper: vec![axis.nees.upper; axis.nees.time_s.len()],
         expected: 1.0,
+        under_truth: None,
         band_label: "band of the gate, all times together".into(),
     })
 }

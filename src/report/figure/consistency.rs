@@ -1,5 +1,6 @@
 //! What tells whether a filter's covariance is true: autocorrelation, NIS histogram, cumulative periodogram, NEES.
 
+use super::Curve;
 use super::chart::{Axis, Chart};
 use super::scale::Scale;
 use super::style::Class;
@@ -119,16 +120,20 @@ pub struct Nees {
     pub title: String,
     pub time_s: Vec<f64>,
     pub nees: Vec<f64>,
-    /// Pointwise bounds.
     pub lower: Vec<f64>,
     pub upper: Vec<f64>,
     /// The number of states, or 1 when NEES is divided by it.
     pub expected: f64,
+    /// What the curve should be when the truth is another than the filter's own.
+    pub under_truth: Option<Curve>,
     /// "95 % at one time".
     pub band_label: String,
 }
 
-/// Average NEES with its pointwise band; a few times stand beside each other as dots, many are a line over time.
+/// Ratio of the largest to the smallest value from which the NEES has a logarithmic axis.
+const WIDE: f64 = 15.0;
+
+/// Average NEES with its band; a few times stand beside each other as dots, many are a line over time.
 pub fn nees(data: &Nees) -> String {
     let few = data.nees.len() <= 12;
     let clock = Clock::covering(&data.time_s);
@@ -139,22 +144,24 @@ pub fn nees(data: &Nees) -> String {
         clock.axis()
     };
     let place = |i: usize, t: f64| if few { i as f64 } else { clock.show(t) };
-    let values = data.nees.iter().chain(&data.lower).chain(&data.upper).copied();
+    let curve = data.under_truth.iter().flat_map(|c| c.points.iter().map(|p| p.1));
+    let values: Vec<f64> =
+        data.nees.iter().chain(&data.lower).chain(&data.upper).copied().chain(curve).chain([data.expected]).collect();
+    let largest = values.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max);
+    let smallest = values.iter().copied().filter(|v| *v > 0.0).fold(f64::INFINITY, f64::min);
+    let scale =
+        if largest > WIDE * smallest { Scale::log(values) } else { Scale::linear_padded(values, &[data.expected]) };
     let outside = data.nees.iter().zip(data.lower.iter().zip(&data.upper)).filter(|(v, (l, u))| *v < l || *v > u);
     let mut chart = Chart::new(
         &data.title,
         &format!(
-            "Average NEES at {} times; expected {:.3}; {} outside their pointwise bounds.",
+            "Average NEES at {} times; expected {:.3}; {} outside their bounds.",
             data.nees.len(),
             data.expected,
             outside.count()
         ),
         time,
-        Axis {
-            name: "average NEES".into(),
-            unit: String::new(),
-            scale: Scale::linear_padded(values, &[data.expected]),
-        },
+        Axis { name: "average NEES".into(), unit: String::new(), scale },
     );
     let bounds = data.time_s.iter().enumerate().zip(data.lower.iter().zip(&data.upper));
     let band: Vec<(f64, f64, f64)> = if few {
@@ -174,7 +181,14 @@ pub fn nees(data: &Nees) -> String {
         chart.line(Class::Line(0), points);
         chart.legend_line(Class::Line(0), "average over runs");
     }
-    chart.legend_line(Class::Expected, "expected");
+    if let Some(curve) = &data.under_truth {
+        let shown = curve.points.iter().enumerate().map(|(i, &(t, v))| (place(i, t), v));
+        chart.line(Class::Line(1), shown.collect());
+        chart.legend_line(Class::Line(1), &curve.label);
+        chart.legend_line(Class::Expected, "right covariance");
+    } else {
+        chart.legend_line(Class::Expected, "expected");
+    }
     chart.legend_band(5, &data.band_label);
     chart.render()
 }

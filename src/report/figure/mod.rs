@@ -7,6 +7,7 @@ mod allan;
 mod budget;
 mod chart;
 mod consistency;
+mod error;
 mod scale;
 mod sheet;
 mod style;
@@ -17,6 +18,7 @@ pub use budget::{BudgetItem, error_budget};
 pub use consistency::{
     Autocorrelation, Histogram, Nees, Periodogram, autocorrelation, cumulative_periodogram, nees, nis_histogram,
 };
+pub use error::{Component, Errors, Rms, errors, rms};
 pub use sheet::sheet;
 pub use style::style_sheet;
 pub use trace::{Estimate, Innovations, Sigma, SigmaState, estimate, innovations, sigma};

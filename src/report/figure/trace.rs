@@ -190,6 +190,11 @@ impl Clock {
         time_s / self.divisor
     }
 
+    /// s at which a twentieth of the span has passed.
+    pub(super) fn early(&self) -> f64 {
+        self.low + 0.05 * (self.high - self.low)
+    }
+
     pub(super) fn axis(&self) -> Axis {
         let scale = if self.high > self.low {
             // a record that starts nearly at zero, as the mean of a first stretch does, starts at zero

@@ -9,6 +9,7 @@ mod architecture;
 mod bad_input;
 mod cli;
 mod consistency;
+mod deployment;
 mod docs;
 mod filter;
 mod identify;

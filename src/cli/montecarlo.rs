@@ -164,6 +164,7 @@ fn many_runs(args: &Args, experiment: &Experiment, course: &Course) -> anyhow::R
     if runs.end - runs.start < 2 && !args.runs.contains("..") {
         bail!("--runs {}: one run judges nothing; expected at least 2", args.runs);
     }
+    args.outputs.check_plans(experiment)?;
     let (start, mut next) = match args.outputs.output.as_deref().filter(|path| args.resume && path.exists()) {
         None => (None, runs.start),
         Some(path) => {
@@ -182,7 +183,14 @@ fn many_runs(args: &Args, experiment: &Experiment, course: &Course) -> anyhow::R
     };
     let stop = Arc::new(AtomicBool::new(false));
     let asked = Arc::clone(&stop);
-    ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed)).context("cannot watch for Ctrl-C")?;
+    // the runs end at their next checkpoint; a second request, or one while they are judged, ends at once
+    let handler = move || {
+        if asked.swap(true, Ordering::Relaxed) {
+            eprintln!("kfdesign: interrupted");
+            std::process::exit(2);
+        }
+    };
+    ctrlc::set_handler(handler).context("cannot watch for Ctrl-C")?;
     let axes = course.axes.len() as u64;
     let bar = progress((runs.end - runs.start) * axes, "runs");
     bar.set_position((next - runs.start) * axes);
@@ -220,6 +228,11 @@ fn many_runs(args: &Args, experiment: &Experiment, course: &Course) -> anyhow::R
             ),
         }
     }
+    // the runs are kept while they are judged, which can take longer than they did
+    if let Some(path) = &args.outputs.output {
+        atomic::write(path, partial(&totals, end).as_bytes())?;
+    }
+    stop.store(true, Ordering::Relaxed);
     let truth = args.truth.iter().map(|path| ("truth's parameters".to_string(), path.display().to_string()));
     let filter = std::iter::once(("filter".to_string(), args.filter.display().to_string()));
     let sources: Vec<_> = filter.chain(truth).collect();
@@ -295,6 +308,15 @@ impl Outputs {
             for input in inputs {
                 atomic::check_output(output, input)?;
             }
+        }
+        Ok(())
+    }
+
+    /// Every plan names a parameter and a factor: better known before the runs than after.
+    fn check_plans(&self, experiment: &Experiment) -> anyhow::Result<()> {
+        if !self.plan.is_empty() {
+            let own = experiment.own_course()?;
+            self.plan.iter().try_for_each(|text| planned(experiment, &own, text).map(|_| ()))?;
         }
         Ok(())
     }

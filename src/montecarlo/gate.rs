@@ -208,23 +208,27 @@ pub fn effective_epochs(axis: &AxisCourse) -> f64 {
 
 /// Law of a least p-value, from drawn ones.
 ///
-/// P(p_min ≤ t) is the share of drawn values up to t. Where fewer than 50 were drawn, it is 1 − (1 − t)^m with the m that fits at the
-/// fiftieth: that many independent tests would behave so.
+/// P(p_min ≤ t) is the share of drawn values up to t. Where fewer than 50 were drawn, it goes on as the power of t that leads from the
+/// five-hundredth to the fiftieth: one for exact p-values, less where the raw p-value makes a tail too light.
 #[derive(Clone, Debug)]
 pub struct LeastLaw {
     drawn: Vec<f64>,
     tail: f64,
-    tests: f64,
+    /// Share up to `tail`.
+    share: f64,
+    power: f64,
 }
 
 impl LeastLaw {
     pub fn new(mut drawn: Vec<f64>) -> LeastLaw {
         drawn.sort_by(f64::total_cmp);
-        let at = FEWEST.min(drawn.len()).max(1) - 1;
-        let tail = drawn.get(at).copied().unwrap_or(1.0);
-        let share = (at as f64 + 0.5) / drawn.len().max(1) as f64;
-        let tests = if tail > 0.0 && tail < 1.0 { (-share).ln_1p() / (-tail).ln_1p() } else { 1.0 };
-        LeastLaw { drawn, tail, tests }
+        let count = drawn.len().max(1) as f64;
+        let value = |at: usize| drawn.get(at.min(drawn.len()).max(1) - 1).copied().unwrap_or(1.0);
+        let (tail, further) = (value(FEWEST), value(10 * FEWEST));
+        let share = (FEWEST.min(drawn.len()).max(1) as f64 - 0.5) / count;
+        let power = 10f64.ln() / (further / tail).ln();
+        let power = if power.is_finite() && drawn.len() > 20 * FEWEST { power.clamp(0.3, 1.5) } else { 1.0 };
+        LeastLaw { drawn, tail, share, power }
     }
 
     /// P(p_min ≤ t).
@@ -233,7 +237,7 @@ impl LeastLaw {
             return f64::NAN;
         }
         if t <= self.tail {
-            return -((-t.min(1.0)).ln_1p() * self.tests).exp_m1();
+            return if t > 0.0 { self.share * (t / self.tail).powf(self.power) } else { 0.0 };
         }
         let above = self.drawn.partition_point(|x| *x <= t);
         if above >= self.drawn.len() {

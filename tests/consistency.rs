@@ -9,6 +9,7 @@ use kfdesign::consistency::normalized::{
 };
 use kfdesign::consistency::whiteness::{Autocorrelation, cumulative_periodogram};
 use kfdesign::consistency::{Test, Verdict};
+use kfdesign::numerics::distribution::{normal_cdf, normal_quantile};
 use kfdesign::numerics::random::{StreamId, fill_normal, stream};
 
 /// A deterministic series, mean removed: sin(0.37 k²) + 0.3 sin(0.9 k), k < 400.
@@ -49,6 +50,51 @@ fn anees_bounds_are_chi_square() {
     let same = across_runs(&[1.0; 50], 1.0, 0.05);
     assert_relative_eq!(same.mean, 1.0);
     assert_relative_eq!(same.upper, 1.4284039, max_relative = 1e-8);
+}
+
+/// The two usual rules for the NEES of a perfect filter: sum it over time, or count the times outside a 95 % band.
+///
+/// The error has one state and the pole of the reference sensor's drift filter, 100 Hz, 600 s. Formula: the sum over n epochs has the
+/// variance of n_eff of them, so it leaves its 95 % bounds with probability 2 Φ(−1.96 √(n_eff/n)) = 96.5 %. Counting: independent
+/// simulation gave 45 %. False alarm: 400 experiments each, bounds at 4.5 standard deviations (3.7 % and 11 %), 1e-5.
+#[test]
+fn usual_rules_reject_perfect_filters() {
+    let (pole, steps, experiments) = (0.99949048_f64, 60_000, 400);
+    let worth = effective_samples(steps as u64, pole * pole);
+    let predicted = 2.0 * normal_cdf(-normal_quantile(0.975) * (worth / steps as f64).sqrt());
+    assert_relative_eq!(predicted, 0.9646, max_relative = 1e-3);
+    let path = |run: u64, axis: u32, pole: f64, steps: usize| {
+        let mut noise = vec![0.0; steps];
+        fill_normal(&mut stream(21, StreamId { run, axis, term: 0 }), &mut noise);
+        let (mut error, fresh) = (noise[0], (1.0 - pole * pole).sqrt());
+        noise.iter_mut().skip(1).for_each(|x| {
+            error = pole * error + fresh * *x;
+            *x = error;
+        });
+        noise
+    };
+    let bounds = mean_of_chi_squares(0.0, steps as u64, 1.0, 0.05);
+    let summed = |run: &u64| {
+        let mean = path(*run, 0, pole, steps).iter().map(|e| e * e).sum::<f64>() / steps as f64;
+        mean < bounds.lower || mean > bounds.upper
+    };
+    let by_sum = (0..experiments).filter(summed).count() as f64 / experiments as f64;
+    // 50 runs at every 40th step, 0.4 s, a fiftieth of the filter's time constant
+    let (runs, times) = (50, steps / 40);
+    let band = mean_of_chi_squares(0.0, runs, 1.0, 0.05);
+    let counted = |experiment: &u64| {
+        let mut nees = vec![0.0; times];
+        for run in 0..runs {
+            let errors = path(experiment * runs + run, 1, pole.powi(40), times);
+            nees.iter_mut().zip(errors).for_each(|(sum, e)| *sum += e * e / runs as f64);
+        }
+        let outside = nees.iter().filter(|v| **v < band.lower || **v > band.upper).count();
+        outside as f64 > 0.05 * times as f64
+    };
+    let by_count = (0..experiments).filter(counted).count() as f64 / experiments as f64;
+    println!("perfect filters rejected: {by_sum} by the sum over time, {by_count} by counting times outside a band");
+    assert!((by_sum - predicted).abs() < 0.042, "{by_sum}");
+    assert!((by_count - 0.45).abs() < 0.11, "{by_count}");
 }
 
 /// Both tails: a mean at the 0.5 % point has p = 0.01 on either side, and the tendency is told apart.

@@ -3,11 +3,14 @@
 //!
 //! Blocks of one page run in order in one scratch directory that holds a copy of `data/`. `cargo run --release -- ARGS`
 //! runs the binary under test; other `cargo` and `git` lines are set-up and are not run. A line may end in `# exit 1`.
-//! `KFDESIGN_UPDATE_DOCS=1 cargo test --release docs` rewrites the `text` blocks from what was printed.
+//! A picture `![words](figures/NAME.svg "REPORT.html, TITLE")` is the figure TITLE of a report that the commands of the page wrote.
+//! `KFDESIGN_UPDATE_DOCS=1 cargo test --release docs` rewrites the `text` blocks from what was printed, and the pictures.
 
 use std::path::{Path, PathBuf};
 
-use crate::support::Bench;
+use kfdesign::report::figure::sheet;
+
+use crate::support::{Bench, figure};
 
 /// A page cut into lines with the fenced blocks found in it.
 struct Page {
@@ -66,6 +69,20 @@ fn copy_dir(from: &Path, to: &Path) {
             std::fs::copy(entry.path(), target).unwrap();
         }
     }
+}
+
+/// File, report and title of every picture on a page.
+fn pictures(page: &Page) -> Vec<(PathBuf, String, String)> {
+    let folder = page.path.parent().unwrap();
+    let mut found = Vec::new();
+    for rest in page.lines.iter().flat_map(|line| line.split("](figures/").skip(1)) {
+        let picture = rest.split_once(" \"").and_then(|(name, rest)| {
+            let (report, title) = rest.split_once("\")")?.0.split_once(", ")?;
+            Some((folder.join("figures").join(name), report.to_string(), title.to_string()))
+        });
+        found.push(picture.unwrap_or_else(|| panic!("{}: picture without a report: {rest}", page.path.display())));
+    }
+    found
 }
 
 /// Split a command line at spaces, keeping "double quoted" and 'single quoted' words whole.
@@ -159,6 +176,16 @@ fn every_command_block_runs_and_prints_what_the_page_shows() {
                 replacements.push((shown.start, shown.end, printed));
             }
         }
+        for (file, report, title) in pictures(&page) {
+            let svg = sheet(&title, &[figure(&bench.read(&report), &title).to_string()]);
+            if std::fs::read_to_string(&file).ok().as_deref() != Some(&svg) {
+                stale.push(file.display().to_string());
+                if update {
+                    std::fs::create_dir_all(file.parent().unwrap()).unwrap();
+                    std::fs::write(&file, svg).unwrap();
+                }
+            }
+        }
         if update && !replacements.is_empty() {
             for (start, end, printed) in replacements.into_iter().rev() {
                 page.lines.splice(start..end, printed);
@@ -169,7 +196,7 @@ fn every_command_block_runs_and_prints_what_the_page_shows() {
     assert!(blocks >= 10, "only {blocks} command blocks were found: the pages or this test are broken");
     assert!(
         update || stale.is_empty(),
-        "these blocks do not show what the commands print (KFDESIGN_UPDATE_DOCS=1 rewrites them): {stale:?}"
+        "these do not show what the commands print and draw (KFDESIGN_UPDATE_DOCS=1 rewrites them): {stale:?}"
     );
 }
 
@@ -179,7 +206,7 @@ fn relative_links_point_to_files_that_exist() {
         let folder = page.path.parent().unwrap().to_path_buf();
         for line in &page.lines {
             for target in line.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
-                let file = target.split('#').next().unwrap_or("");
+                let file = target.split(['#', ' ']).next().unwrap_or("");
                 if file.is_empty() || file.contains("://") {
                     continue;
                 }

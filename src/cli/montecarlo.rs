@@ -61,7 +61,7 @@ pub struct Args {
     #[arg(long, default_value_t = 0, value_name = "N")]
     replicates: u64,
     /// Simulate this run alone; -o takes its numbers (.csv, .csv.gz or .npy)
-    #[arg(long, value_name = "NUMBER", conflicts_with_all = ["runs", "resume", "json", "junit"])]
+    #[arg(long, value_name = "NUMBER", conflicts_with_all = ["runs", "resume", "json", "junit", "report"])]
     run: Option<u64>,
     /// Go on from what -o FILE holds of the same experiment
     #[arg(long, requires = "output")]

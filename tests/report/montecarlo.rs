@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::{assert_inside, assert_well_formed, save};
-use crate::support::{Bench, data};
+use crate::support::{Bench, data, figure};
 
 const RUNS: &str = "--runs 30 --duration 100s --seed 1";
 
@@ -25,11 +25,6 @@ fn numbers(value: &Value) -> Vec<f64> {
 
 fn figures(html: &str) -> Vec<&str> {
     html.split("<svg ").skip(1).map(|rest| rest.split("</svg>").next().unwrap()).collect()
-}
-
-fn figure<'a>(html: &'a str, title: &str) -> &'a str {
-    let wanted = format!("<title>{title}</title>");
-    figures(html).into_iter().find(|svg| svg.contains(&wanted)).unwrap_or_else(|| panic!("no figure '{title}'"))
 }
 
 fn attribute(line: &str, key: &str) -> f64 {

@@ -64,6 +64,14 @@ impl Bench {
     }
 }
 
+/// The figure of a report page, by its title.
+pub fn figure<'a>(html: &'a str, title: &str) -> &'a str {
+    let at = html.find(&format!("<title>{title}</title>")).unwrap_or_else(|| panic!("no figure '{title}'"));
+    let start = html[..at].rfind("<svg ").unwrap();
+    let end = at + html[at..].find("</svg>\n").unwrap() + "</svg>\n".len();
+    &html[start..end]
+}
+
 /// The project's own data folder.
 pub fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("data").join(name)

@@ -241,6 +241,9 @@ fn params(found: &str, replaced: &str) -> Vec<u8> {
     good.replace(found, replaced).into_bytes()
 }
 
+const LINE: &str = r#""oscillation": { "std_dev": "0.1 deg/s", "frequency": "20 Hz", "correlation_time": "3 s" },
+      "gauss_markov""#;
+
 #[test]
 fn parameters_that_cannot_be_used() {
     let run = "tune params.json -o out.json";
@@ -271,6 +274,19 @@ fn parameters_that_cannot_be_used() {
         row("negative density", "0.0562 deg", "-0.0562 deg", &["axes[0].white.density", "-0.0562"]),
         row("not a number", "0.0562 deg", "NaN deg", &["axes[0].white.density", "NaN"]),
         row("zero correlation time", "190 s", "0 s", &["axes[0].gauss_markov[0].correlation_time", "0"]),
+        row(
+            "line above half the sample rate",
+            "\"gauss_markov\"",
+            &LINE.replace("20 Hz", "60 Hz"),
+            &["axis 'x'", "oscillation", "60.00 Hz", "half the sample rate"],
+        ),
+        (
+            "simulated line above half the sample rate",
+            "params.json",
+            params("\"gauss_markov\"", LINE),
+            "simulate params.json -o log.csv --duration 10s --rate 30",
+            &["axis 'x'", "20.00 Hz", "30.00 Hz"],
+        ),
         row("zero sample rate", "100 Hz", "0 Hz", &["sample_rate", "0"]),
         row("no white noise", "\"white\": { \"density\": \"0.0562 deg/s/sqrt(Hz)\" },", "", &["x", "white"]),
         (

@@ -3,6 +3,8 @@
 #[allow(clippy::excessive_precision, clippy::approx_constant, reason = "17 digits, as the oracle printed them")]
 mod vectors;
 
+mod line;
+
 use kfdesign::noise::Term;
 use kfdesign::numerics::random::{StreamId, stream};
 use nalgebra::DMatrix;
@@ -13,9 +15,10 @@ const WHITE: Term = Term::White { density: 0.0562 };
 const GAUSS_MARKOV: Term = Term::GaussMarkov { std_dev: 0.03, correlation_time: 193.9312 };
 const QUANTIZATION: Term = Term::Quantization { coefficient: 1e-3 };
 const FLICKER: Term = Term::BiasInstability { coefficient: 0.013 };
+const LINE: Term = Term::Oscillation { std_dev: 0.03, frequency_hz: 20.3, correlation_time: 0.5 };
 const RANDOM_WALK: Term = Term::RateRandomWalk { density: 2.85e-3 };
 const RAMP: Term = Term::RateRamp { slope: 2e-4 };
-const ALL: [Term; 6] = [WHITE, GAUSS_MARKOV, QUANTIZATION, FLICKER, RANDOM_WALK, RAMP];
+const ALL: [Term; 7] = [WHITE, GAUSS_MARKOV, QUANTIZATION, FLICKER, LINE, RANDOM_WALK, RAMP];
 
 fn assert_relative(found: f64, expected: f64, tolerance: f64, what: &str) {
     assert!((found - expected).abs() <= tolerance * expected.abs(), "{what}: {found:e}, expected {expected:e}");
@@ -117,7 +120,7 @@ mod allan_curve {
     #[test]
     fn equals_the_integral_of_the_spectrum() {
         let gauss_markov = Term::GaussMarkov { std_dev: 0.03, correlation_time: 0.5 };
-        for term in [WHITE, gauss_markov, QUANTIZATION, FLICKER, RANDOM_WALK] {
+        for term in [WHITE, gauss_markov, QUANTIZATION, FLICKER, LINE, RANDOM_WALK] {
             for m in [1, 2, 3, 10, 64] {
                 let integral = 4.0
                     * integrate(0.0, 0.5 / DT, 400 * m as usize, |f| {
@@ -134,7 +137,7 @@ mod allan_curve {
     #[test]
     fn spectrum_integrates_to_the_autocovariance() {
         let gauss_markov = Term::GaussMarkov { std_dev: 0.03, correlation_time: 0.05 };
-        for term in [WHITE, gauss_markov, QUANTIZATION] {
+        for term in [WHITE, gauss_markov, QUANTIZATION, LINE] {
             for lag in [0, 1, 2, 7] {
                 let integral = 2.0
                     * integrate(0.0, 0.5 / DT, 400, |f| {
@@ -219,7 +222,7 @@ mod second_difference {
                 _ => term.autocovariance(l, DT).unwrap(),
             }
         };
-        for term in [WHITE, GAUSS_MARKOV, fast, very_fast, QUANTIZATION, FLICKER, RANDOM_WALK] {
+        for term in [WHITE, GAUSS_MARKOV, fast, very_fast, QUANTIZATION, FLICKER, LINE, RANDOM_WALK] {
             for (m1, m2) in [(1, 1), (1, 2), (2, 1), (3, 3), (5, 12), (12, 5), (1, 25), (20, 20)] {
                 let scale = (term.second_difference_autocovariance(m1, 0, DT)
                     * term.second_difference_autocovariance(m2, 0, DT))
@@ -240,7 +243,7 @@ mod second_difference {
 
     #[test]
     fn is_twice_the_allan_variance_at_lag_zero() {
-        for term in [WHITE, GAUSS_MARKOV, QUANTIZATION, FLICKER, RANDOM_WALK] {
+        for term in [WHITE, GAUSS_MARKOV, QUANTIZATION, FLICKER, LINE, RANDOM_WALK] {
             for m in [1, 2, 3, 17, 1000, 123_457, 10_000_000] {
                 let expected = 2.0 * (m as f64 * DT).powi(2) * term.allan_variance(m, DT);
                 let found = term.second_difference_autocovariance(m, 0, DT);
@@ -278,7 +281,7 @@ mod second_difference {
 
     #[test]
     fn is_symmetric_and_vanishes_far_away() {
-        for term in [WHITE, GAUSS_MARKOV, QUANTIZATION, FLICKER, RANDOM_WALK] {
+        for term in [WHITE, GAUSS_MARKOV, QUANTIZATION, FLICKER, LINE, RANDOM_WALK] {
             for (m1, m2, h) in [(3, 8, 5), (3, 8, -5), (1000, 7, 900), (12, 12, 3)] {
                 let a = term.second_difference_cross_covariance(m1, m2, h, DT);
                 let b = term.second_difference_cross_covariance(m2, m1, -h, DT);
@@ -318,7 +321,7 @@ mod realisation {
     #[test]
     fn has_the_allan_variance_of_the_process() {
         let fast = Term::GaussMarkov { std_dev: 0.03, correlation_time: 0.05 };
-        for term in [fast, QUANTIZATION, RANDOM_WALK, RAMP, FLICKER] {
+        for term in [fast, QUANTIZATION, LINE, RANDOM_WALK, RAMP, FLICKER] {
             // flicker is a chain of states: 1 % between dt and the horizon
             let tolerance = if term == FLICKER { 1e-2 } else { 1e-11 };
             for m in [1, 2, 3, 10, 30] {
@@ -333,7 +336,7 @@ mod realisation {
     /// h Φ^k P0 hᵀ is the autocovariance, and P0 the fixed point of the covariance recursion.
     #[test]
     fn starts_in_its_stationary_law() {
-        for term in [GAUSS_MARKOV, QUANTIZATION, FLICKER] {
+        for term in [GAUSS_MARKOV, QUANTIZATION, LINE, FLICKER] {
             let r = term.realisation(DT, 1000.0).unwrap();
             let next: DMatrix<f64> = &r.phi * &r.p0 * r.phi.transpose() + &r.q;
             assert!((&next - &r.p0).amax() <= 1e-15 * r.p0.amax(), "{term:?} is not stationary");
@@ -384,11 +387,13 @@ mod sample_path {
         (sum / count as f64 / (2.0 * (m as f64 * DT).powi(2)), edf)
     }
 
-    /// False alarm: 1e-6 for each of the 24 points (chi-square with at least 130 equivalent degrees of freedom).
+    /// False alarm: 1e-6 for each of the 28 points (chi-square with at least 130 equivalent degrees of freedom).
     #[test]
     fn has_the_allan_curve() {
         let fast = Term::GaussMarkov { std_dev: 0.03, correlation_time: 0.05 };
-        for (seed, term) in [WHITE, GAUSS_MARKOV, fast, QUANTIZATION, FLICKER, RANDOM_WALK].into_iter().enumerate() {
+        for (seed, term) in
+            [WHITE, GAUSS_MARKOV, fast, QUANTIZATION, FLICKER, RANDOM_WALK, LINE].into_iter().enumerate()
+        {
             let y = path(term, seed as u64, 200_000);
             for m in [1, 4, 40, 400] {
                 let (found, edf) = estimate(term, &y, m);

@@ -78,6 +78,11 @@ fn writing_and_reading_gives_the_same_document() {
                 terms: vec![
                     TermEntry::Quantization { coefficient: measured(1e-6, "m/s", None) },
                     TermEntry::White { density: measured(0.1 + 0.2, "µg/√Hz", Some([0.1, 0.7])) },
+                    TermEntry::Oscillation {
+                        std_dev: measured(3.0, "mg", None),
+                        frequency: measured(20.0, "Hz", Some([19.5, 20.5])),
+                        correlation_time: measured(3.0, "s", None),
+                    },
                     TermEntry::BiasInstability { coefficient: measured(12.0, "ug", None) },
                     TermEntry::GaussMarkov {
                         std_dev: measured(5.0, "ug", None),
@@ -118,6 +123,11 @@ fn writing_and_reading_gives_the_same_document() {
 fn each_complaint_names_file_key_and_reason() {
     let white = |density: Value| with("/axes/0/white", json!({ "density": density }));
     let gauss_markov = |term: Value| with("/axes/0/gauss_markov", json!([term]));
+    let line = |key: &str, value: Value| {
+        let mut term = json!({"std_dev": "1 deg/s", "frequency": "20 Hz", "correlation_time": "3 s"});
+        term[key] = value;
+        with("/axes/0/oscillation", json!([term]))
+    };
     let mut twice = document();
     let axis = twice["axes"][0].clone();
     twice["axes"].as_array_mut().unwrap().push(axis);
@@ -167,6 +177,13 @@ fn each_complaint_names_file_key_and_reason() {
         (gauss_markov(json!({"std_dev": "1 deg/s"})), "axes[0].gauss_markov[0].correlation_time: ", "missing"),
         (gauss_markov(json!({"std_dev": "1 deg/s", "correlation_time": "0 s"})), "axes[0].gauss_markov[0].correlation_time: ", "greater than zero"),
         (gauss_markov(json!({"std_dev": "1 deg/s", "correlation_time": "1 Hz"})), "axes[0].gauss_markov[0].correlation_time: ", "expected a time"),
+        (line("std_dev", json!("-1 deg/s")), "axes[0].oscillation[0].std_dev: ", "greater than zero"),
+        (line("frequency", json!("0 Hz")), "axes[0].oscillation[0].frequency: ", "greater than zero"),
+        (line("frequency", json!(20)), "axes[0].oscillation[0].frequency: ", "the number 20 has no unit"),
+        (line("frequency", json!("20 s")), "axes[0].oscillation[0].frequency: ", "expected a frequency"),
+        (line("frequency", json!(null)), "axes[0].oscillation[0].frequency: ", "missing"),
+        (line("correlation_time", json!("3 Hz")), "axes[0].oscillation[0].correlation_time: ", "expected a time"),
+        (line("phase", json!("0 deg")), "axes[0].oscillation[0].phase: ", "unknown key"),
         (with("/axes/0/bias", json!("1 deg")), "axes[0].bias: ", "the integral of what is wanted"),
         (with("/axes/0/turn_on_bias", json!("1 deg/s")), "axes[0].turn_on_bias: ", "an object with std_dev"),
         (with("/axes/0/rate_ramp", json!({"slope": "1 deg/s"})), "axes[0].rate_ramp.slope: ", "angular acceleration"),

@@ -19,6 +19,7 @@ const RICH: &str = r#"{
      "bias_instability": {"coefficient": "0.02 deg/s"},
      "gauss_markov": [{"std_dev": "0.03 deg/s", "correlation_time": "10 s"},
                       {"std_dev": "0.01 deg/s", "correlation_time": "200 s"}],
+     "oscillation": {"std_dev": "0.02 deg/s", "frequency": "7 Hz", "correlation_time": "3 s"},
      "rate_random_walk": {"density": "0.001 deg/s/sqrt(s)"},
      "rate_ramp": {"slope": "0.0001 deg/s^2"}},
     {"name": "y", "white": {"density": "0.05 deg/s/sqrt(Hz)"}}
@@ -78,7 +79,7 @@ mod library {
         let motion = TrueRate::Sinusoid { amplitude: 0.2, frequency_hz: 0.5 };
         let axes = simulate(&params, &Scenario { true_rate: motion, ..scenario(500) }, 64);
         let kinds: Vec<Kind> = params.axes[0].noise().terms.iter().map(|t| t.kind()).collect();
-        assert_eq!(kinds.len(), 7);
+        assert_eq!(kinds.len(), 8);
         let x = &axes[0];
         assert!((x.bias - 2.0 * DEGREE).abs() < 1e-15);
         for k in 0..500 {
@@ -88,7 +89,7 @@ mod library {
                 .terms
                 .iter()
                 .zip(&kinds)
-                .filter(|(_, kind)| !matches!(kind, Kind::White | Kind::Quantization))
+                .filter(|(_, kind)| !matches!(kind, Kind::White | Kind::Quantization | Kind::Oscillation))
                 .map(|(t, _)| t[k])
                 .sum();
             assert!((x.drift[k] - drift).abs() < 1e-15, "sample {k}");
@@ -120,10 +121,10 @@ mod library {
         // the other axis away; terms of other kinds and the later one of the same kind away; a longer run
         let mut fewer = params.clone();
         fewer.axes.truncate(1);
-        fewer.axes[0].terms.remove(4);
+        fewer.axes[0].terms.remove(5);
         fewer.axes[0].terms.remove(0);
         let found = simulate(&fewer, &scenario(900), 100);
-        for (i, j) in [(0, 1), (1, 2), (2, 3), (3, 5), (4, 6)] {
+        for (i, j) in [(0, 1), (1, 2), (2, 3), (3, 4), (4, 6), (5, 7)] {
             assert_eq!(found[0].terms[i][..300], base[0].terms[j], "term {j}");
         }
         // the turn-on draw and the motion have streams of their own or none
@@ -140,7 +141,7 @@ mod library {
         for (seed, run) in [(1, 0), (1, 1), (2, 0)] {
             for axis in simulate(&twin, &Scenario { seed, run, ..scenario(3) }, 3) {
                 // the ramp is the last and draws nothing; the random walk starts at 0: compare the third sample's change
-                for term in &axis.terms[..6] {
+                for term in &axis.terms[..7] {
                     first.push((term[2] - term[1]).to_bits());
                 }
             }
@@ -148,7 +149,7 @@ mod library {
         let count = first.len();
         first.sort_unstable();
         first.dedup();
-        assert_eq!((count, first.len()), (36, 36), "two streams are alike");
+        assert_eq!((count, first.len()), (42, 42), "two streams are alike");
     }
 
     #[test]
@@ -161,6 +162,7 @@ mod library {
             (Kind::GaussMarkov, 0x4_0000),
             (Kind::RateRandomWalk, 0x5_0000),
             (Kind::RateRamp, 0x6_0000),
+            (Kind::Oscillation, 0x7_0000),
         ] {
             assert_eq!((term_number(kind, 0), term_number(kind, 3)), (code, code + 3));
         }

@@ -306,6 +306,11 @@ fn parameter_rows(axis: &Axis, quantity: Quantity) -> Vec<Vec<String>> {
         match term {
             TermEntry::Quantization { coefficient } => rows.push(row("quantization Q", coefficient, String::new())),
             TermEntry::White { density } => rows.push(row("white N", density, random_walk_name(density, quantity))),
+            TermEntry::Oscillation { std_dev, frequency, correlation_time } => {
+                rows.push(row("oscillation sigma", std_dev, String::new()));
+                rows.push(row("oscillation f0", frequency, String::new()));
+                rows.push(row("oscillation Tc", correlation_time, String::new()));
+            }
             TermEntry::BiasInstability { coefficient } => {
                 rows.push(row("flicker B (bias instability)", coefficient, floor_name(coefficient, quantity)));
             }

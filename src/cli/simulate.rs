@@ -271,7 +271,9 @@ fn display_unit(params: &Params) -> anyhow::Result<Unit> {
                 let text = density.unit.text();
                 ["/sqrt(Hz)", "/√Hz", "/rtHz"].iter().find_map(|root| Unit::parse(text.strip_suffix(root)?).ok())
             }
-            TermEntry::GaussMarkov { std_dev, .. } => Some(std_dev.unit.clone()),
+            TermEntry::GaussMarkov { std_dev, .. } | TermEntry::Oscillation { std_dev, .. } => {
+                Some(std_dev.unit.clone())
+            }
             TermEntry::BiasInstability { coefficient } => Some(coefficient.unit.clone()),
             _ => None,
         });

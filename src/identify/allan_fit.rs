@@ -7,7 +7,7 @@
 
 use super::points::Points;
 use super::selection::{FIT_LEVEL, PENALTY, Table, score, search};
-use super::shape::{Role, Shape, document_name, short_name};
+use super::shape::{Role, Shape, document_name, in_allan_curve, roles, short_name};
 use super::weighted_fit::{Fit, tolerated};
 use super::{Candidate, Identified, IdentifyError, ModelChoice, bias, entry, usable};
 use crate::allan::{self, AllanCurve, Deviation, TauGrid};
@@ -42,6 +42,12 @@ pub(super) fn identify(
         ModelChoice::Auto => None,
         ModelChoice::Terms(kinds) => Some(Shape::new(kinds.clone())),
     };
+    if let Some(kind) = forced.iter().flat_map(Shape::kinds).find(|kind| !in_allan_curve(**kind)) {
+        return Err(failed(format!(
+            "{} needs --method likelihood: an Allan curve does not show it apart from white noise",
+            short_name(*kind)
+        )));
+    }
     let table = search(&points, forced.as_ref());
     let fit = match &forced {
         Some(_) => table.best(),
@@ -125,7 +131,7 @@ fn known_terms(fit: &Fit, rate: &[f64]) -> Vec<(Term, [Option<[f64; 2]>; 2])> {
     let mut index = 0;
     let mut known = Vec::new();
     for term in fit.model().terms {
-        let parameters = if term.kind() == Kind::GaussMarkov { 2 } else { 1 };
+        let parameters = roles(term.kind()).len();
         let intervals: Vec<Option<[f64; 2]>> = (index..index + parameters).map(|j| interval(fit, j)).collect();
         index += parameters;
         if intervals.iter().all(Option::is_some) {
@@ -167,7 +173,8 @@ impl Words<'_> {
         let name = document_name(kind);
         match role {
             Role::CorrelationTime => format!("{name}.correlation_time"),
-            Role::Coefficient if kind == Kind::GaussMarkov => format!("{name}.std_dev"),
+            Role::Frequency => format!("{name}.frequency"),
+            Role::Coefficient if roles(kind).len() > 1 => format!("{name}.std_dev"),
             Role::Coefficient => name.into(),
         }
     }
@@ -178,6 +185,7 @@ impl Words<'_> {
         let value = fit.log_parameters[index].exp();
         match role {
             Role::CorrelationTime => format!("{} s", digits(value)),
+            Role::Frequency => format!("{} Hz", digits(value)),
             Role::Coefficient => {
                 let unit = super::coefficient_unit(kind, self.display);
                 format!("{} {unit}", digits(unit.from_si(value)))

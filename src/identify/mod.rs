@@ -16,6 +16,8 @@ use serde::Serialize;
 use crate::allan::AllanCurve;
 use crate::noise::{Kind, NoiseModel, Term};
 use crate::numerics::reduce::mean;
+use nalgebra::Complex;
+
 use crate::params::{AxisParams, Measured, NotIdentified, TermEntry};
 use crate::units::{Unit, digits};
 
@@ -122,8 +124,8 @@ pub fn parse_model(text: &str) -> Result<ModelChoice, IdentifyError> {
             .into_iter()
             .find(|k| part == shape::short_name(*k) || part == shape::document_name(*k))
             .ok_or_else(|| failed(format!("unknown term '{part}'; known are {} (joined by +), or auto", known())))?;
-        if kind != Kind::GaussMarkov && kinds.contains(&kind) {
-            return Err(failed(format!("'{part}' stands twice; only gm may")));
+        if !matches!(kind, Kind::GaussMarkov | Kind::Oscillation) && kinds.contains(&kind) {
+            return Err(failed(format!("'{part}' stands twice; only gm and osc may")));
         }
         kinds.push(kind);
     }
@@ -164,24 +166,33 @@ fn coefficient_unit(kind: Kind, display: &Unit) -> Unit {
     display.times_time(match kind {
         Kind::Quantization => 2,
         Kind::White => 1,
-        Kind::BiasInstability | Kind::GaussMarkov => 0,
+        Kind::Oscillation | Kind::BiasInstability | Kind::GaussMarkov => 0,
         Kind::RateRandomWalk => -1,
         Kind::RateRamp => -2,
     })
 }
 
-/// A term as documented, with the 95 % intervals (SI) of its one or two parameters.
-fn entry(term: &Term, intervals: &[Option<[f64; 2]>; 2], display: &Unit) -> Result<TermEntry, IdentifyError> {
-    let seconds = Unit::parse("s").map_err(|e| IdentifyError { message: e.to_string() })?;
+/// A term as documented, with the 95 % intervals (SI) of its parameters as far as they are known, in the order of [`Term`].
+fn entry(term: &Term, intervals: &[Option<[f64; 2]>], display: &Unit) -> Result<TermEntry, IdentifyError> {
     let unit = coefficient_unit(term.kind(), display);
-    let coefficient = |value: f64| Measured::from_si(value, intervals[0], unit.clone());
+    let interval = |index: usize| intervals.get(index).copied().flatten();
+    let coefficient = |value: f64| Measured::from_si(value, interval(0), unit.clone());
+    let further = |index: usize, value: f64, unit: &str| {
+        let unit = Unit::parse(unit).map_err(|e| IdentifyError { message: e.to_string() })?;
+        Ok(Measured { value, unit, interval: interval(index) })
+    };
     Ok(match *term {
         Term::Quantization { coefficient: q } => TermEntry::Quantization { coefficient: coefficient(q) },
         Term::White { density } => TermEntry::White { density: coefficient(density) },
+        Term::Oscillation { std_dev, frequency_hz, correlation_time } => TermEntry::Oscillation {
+            std_dev: coefficient(std_dev),
+            frequency: further(1, frequency_hz, "Hz")?,
+            correlation_time: further(2, correlation_time, "s")?,
+        },
         Term::BiasInstability { coefficient: b } => TermEntry::BiasInstability { coefficient: coefficient(b) },
         Term::GaussMarkov { std_dev, correlation_time } => TermEntry::GaussMarkov {
             std_dev: coefficient(std_dev),
-            correlation_time: Measured { value: correlation_time, unit: seconds, interval: intervals[1] },
+            correlation_time: further(1, correlation_time, "s")?,
         },
         Term::RateRandomWalk { density } => TermEntry::RateRandomWalk { density: coefficient(density) },
         Term::RateRamp { slope } => TermEntry::RateRamp { slope: coefficient(slope) },
@@ -190,7 +201,8 @@ fn entry(term: &Term, intervals: &[Option<[f64; 2]>; 2], display: &Unit) -> Resu
 
 /// The mean of the log with its 95 % interval for the constant bias.
 ///
-/// Variance of the record mean over T: N²/T + 2σ²Tc/T·(1 − (Tc/T)(1 − e^(−T/Tc))) for the stationary terms. A
+/// Variance of the record mean over T: N²/T + 2σ²Tc/T·(1 − (Tc/T)(1 − e^(−T/Tc))) for the stationary terms, of an oscillation the
+/// real part at 1/Tc − i2πf₀ in place of 1/Tc. A
 /// random walk, flicker or ramp has no mean; for these the interval is where the mean of an equally long next log will lie
 /// (twice their Allan variance at T).
 fn bias(rate: &[f64], dt: f64, model: &NoiseModel, display: &Unit) -> Measured {
@@ -201,6 +213,10 @@ fn bias(rate: &[f64], dt: f64, model: &NoiseModel, display: &Unit) -> Measured {
         Term::GaussMarkov { std_dev, correlation_time } => {
             let x = correlation_time / span;
             2.0 * std_dev * std_dev * x * (1.0 + x * (-1.0 / x).exp_m1())
+        }
+        Term::Oscillation { std_dev, frequency_hz, correlation_time } => {
+            let x = Complex::new(span / correlation_time, -std::f64::consts::TAU * frequency_hz * span).inv();
+            2.0 * std_dev * std_dev * (x * (x * ((-x.inv()).exp() - 1.0) + 1.0)).re
         }
         // the error of the integral over its length
         Term::Quantization { coefficient } => 2.0 * (coefficient / span).powi(2),

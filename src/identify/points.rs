@@ -153,7 +153,7 @@ impl Table {
         let coefficient = match *term {
             Term::Quantization { coefficient } | Term::BiasInstability { coefficient } => coefficient,
             Term::White { density } | Term::RateRandomWalk { density } => density,
-            Term::GaussMarkov { std_dev, .. } => std_dev,
+            Term::GaussMarkov { std_dev, .. } | Term::Oscillation { std_dev, .. } => std_dev,
             Term::RateRamp { slope } => slope,
         };
         coefficient * coefficient

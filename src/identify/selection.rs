@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use super::points::Points;
-use super::shape::{KINDS, Shape};
+use super::shape::{KINDS, Shape, in_allan_curve};
 use super::weighted_fit::{Fit, fit};
 use crate::noise::Kind;
 
@@ -87,10 +87,11 @@ fn neighbours(shape: &Shape) -> Vec<Shape> {
         Kind::GaussMarkov => shape.count(kind) < MOST_GAUSS_MARKOV,
         kind => !shape.has(kind),
     };
-    let mut found: Vec<Shape> = KINDS.iter().filter(|k| may_add(shape, **k)).map(|k| shape.with(*k)).collect();
+    let kinds = || KINDS.into_iter().filter(|k| in_allan_curve(*k));
+    let mut found: Vec<Shape> = kinds().filter(|k| may_add(shape, *k)).map(|k| shape.with(k)).collect();
     for kind in shape.kinds().iter().filter(|k| **k != Kind::White) {
         let fewer = shape.without(*kind);
-        found.extend(KINDS.iter().filter(|k| **k != *kind && may_add(&fewer, **k)).map(|k| fewer.with(*k)));
+        found.extend(kinds().filter(|k| k != kind && may_add(&fewer, *k)).map(|k| fewer.with(k)));
         found.push(fewer);
     }
     found

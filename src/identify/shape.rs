@@ -2,9 +2,10 @@
 
 use crate::noise::{Kind, NoiseModel, Term};
 
-/// A list of kinds in the order of [`Kind`]; only Gauss-Markov may stand more than once.
+/// A list of kinds in the order of [`Kind`]; only Gauss-Markov and oscillation may stand more than once.
 ///
-/// Parameters are natural logarithms of the SI coefficients, term by term; a Gauss-Markov term has two, ln σ and ln Tc.
+/// Parameters are natural logarithms of the SI coefficients, term by term; a Gauss-Markov term has two, ln σ and ln Tc,
+/// an oscillation three, ln σ, ln f₀ and ln Tc.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Shape {
     kinds: Vec<Kind>,
@@ -15,6 +16,8 @@ pub(super) struct Shape {
 pub(super) enum Role {
     /// Enters the Allan variance as its square.
     Coefficient,
+    /// Hz.
+    Frequency,
     CorrelationTime,
 }
 
@@ -45,14 +48,10 @@ impl Shape {
     }
     /// Kind and role of every parameter.
     pub(super) fn roles(&self) -> Vec<(Kind, Role)> {
-        let of = |kind: Kind| {
-            let second = (kind == Kind::GaussMarkov).then_some((kind, Role::CorrelationTime));
-            [Some((kind, Role::Coefficient)), second].into_iter().flatten()
-        };
-        self.kinds.iter().copied().flat_map(of).collect()
+        self.kinds.iter().flat_map(|kind| roles(*kind).iter().map(|role| (*kind, *role))).collect()
     }
     pub(super) fn parameters(&self) -> usize {
-        self.kinds.len() + self.count(Kind::GaussMarkov)
+        self.roles().len()
     }
     /// The terms at these parameters, SI.
     pub(super) fn model(&self, log_parameters: &[f64]) -> NoiseModel {
@@ -60,6 +59,7 @@ impl Shape {
         let mut next = || values.next().unwrap_or(f64::NAN);
         let terms = self.kinds.iter().map(|kind| match kind {
             Kind::GaussMarkov => Term::GaussMarkov { std_dev: next(), correlation_time: next() },
+            Kind::Oscillation => Term::Oscillation { std_dev: next(), frequency_hz: next(), correlation_time: next() },
             kind => one_coefficient(*kind, next()),
         });
         NoiseModel { terms: terms.collect() }
@@ -72,11 +72,21 @@ impl Shape {
     }
 }
 
-/// A term with one coefficient; Gauss-Markov gets a correlation time of 1 s.
+/// What the parameters of a term are, in the order of [`Term`].
+pub(super) fn roles(kind: Kind) -> &'static [Role] {
+    match kind {
+        Kind::GaussMarkov => &[Role::Coefficient, Role::CorrelationTime],
+        Kind::Oscillation => &[Role::Coefficient, Role::Frequency, Role::CorrelationTime],
+        _ => &[Role::Coefficient],
+    }
+}
+
+/// A term with one coefficient; correlation times are 1 s, frequencies 1 Hz.
 pub(super) fn one_coefficient(kind: Kind, value: f64) -> Term {
     match kind {
         Kind::Quantization => Term::Quantization { coefficient: value },
         Kind::White => Term::White { density: value },
+        Kind::Oscillation => Term::Oscillation { std_dev: value, frequency_hz: 1.0, correlation_time: 1.0 },
         Kind::BiasInstability => Term::BiasInstability { coefficient: value },
         Kind::GaussMarkov => Term::GaussMarkov { std_dev: value, correlation_time: 1.0 },
         Kind::RateRandomWalk => Term::RateRandomWalk { density: value },
@@ -89,6 +99,7 @@ pub(super) fn short_name(kind: Kind) -> &'static str {
     match kind {
         Kind::Quantization => "quantization",
         Kind::White => "white",
+        Kind::Oscillation => "osc",
         Kind::BiasInstability => "flicker",
         Kind::GaussMarkov => "gm",
         Kind::RateRandomWalk => "rrw",
@@ -101,6 +112,7 @@ pub(super) fn document_name(kind: Kind) -> &'static str {
     match kind {
         Kind::Quantization => "quantization",
         Kind::White => "white",
+        Kind::Oscillation => "oscillation",
         Kind::BiasInstability => "bias_instability",
         Kind::GaussMarkov => "gauss_markov",
         Kind::RateRandomWalk => "rate_random_walk",
@@ -109,5 +121,17 @@ pub(super) fn document_name(kind: Kind) -> &'static str {
 }
 
 /// All kinds, in the fixed order.
-pub(super) const KINDS: [Kind; 6] =
-    [Kind::Quantization, Kind::White, Kind::BiasInstability, Kind::GaussMarkov, Kind::RateRandomWalk, Kind::RateRamp];
+pub(super) const KINDS: [Kind; 7] = [
+    Kind::Quantization,
+    Kind::White,
+    Kind::Oscillation,
+    Kind::BiasInstability,
+    Kind::GaussMarkov,
+    Kind::RateRandomWalk,
+    Kind::RateRamp,
+];
+
+/// The kinds that show in an Allan curve: it averages a narrow line away.
+pub(super) fn in_allan_curve(kind: Kind) -> bool {
+    kind != Kind::Oscillation
+}

@@ -20,7 +20,7 @@ pub struct InitialBias {
 ///
 /// `dt` in s; `horizon_s` is the slowest time constant that flicker must cover. `bias` is the constant part; without it there is
 /// no "bias" state. State names are unique: "gauss_markov", "gauss_markov.2". P0 of a process is that of its realisation.
-/// Errors: `dt`, `horizon_s` or the bias spread out of range, or no white noise.
+/// Errors: `dt`, `horizon_s` or the bias spread out of range, a line not below half the sample rate, or no white noise.
 pub fn augment(
     plant: Plant,
     quantity: Quantity,
@@ -34,6 +34,7 @@ pub fn augment(
             return Err(ModelError::NotPositive { name, value });
         }
     }
+    noise.check_rate(dt)?;
     let Plant::Static = plant;
     let mut blocks = Vec::new();
     let mut x0 = Vec::new();

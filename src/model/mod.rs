@@ -9,6 +9,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::noise::TooFast;
 use crate::numerics::linalg::{cholesky, cholesky_semidefinite, relative_to_diagonal};
 
 pub use augment::{InitialBias, augment};
@@ -52,6 +53,8 @@ pub enum ModelError {
     NoMeasurementNoise,
     #[error("unknown plant '{found}'; known plants: {known}")]
     UnknownPlant { found: String, known: String },
+    #[error(transparent)]
+    TooFast(#[from] TooFast),
     #[error("{name} is {value}; expected a number greater than zero")]
     NotPositive { name: &'static str, value: f64 },
 }

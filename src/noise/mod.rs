@@ -1,11 +1,12 @@
 //! Noise processes: spectrum, Allan variance (sampled form), autocovariance, state-space realisation, exact sample path (floor 1).
 //!
 //! One file per process. Every coefficient is SI: with u the unit of the quantity (rad/s or m/s²),
-//! `density` u/√Hz, `std_dev` u, `correlation_time` s, rate-random-walk `density` u/√s, `coefficient` of flicker u,
+//! `density` u/√Hz, `std_dev` u, `frequency_hz` Hz, `correlation_time` s, rate-random-walk `density` u/√s, `coefficient` of flicker u,
 //! of quantisation u·s, `slope` u/s.
 
 mod bias_instability;
 mod gauss_markov;
+mod oscillation;
 mod quantization;
 mod ramp;
 mod random_walk;
@@ -17,16 +18,29 @@ use rand::rngs::ChaCha8Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::units::digits;
+
 /// The kinds of term, in the fixed order used everywhere (documents, tables, random streams).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
     Quantization,
     White,
+    Oscillation,
     BiasInstability,
     GaussMarkov,
     RateRandomWalk,
     RateRamp,
+}
+
+impl Kind {
+    /// Drift of the bias, which a filter estimates and takes off; else noise of the measurement, whatever states it needs.
+    pub fn is_drift(self) -> bool {
+        match self {
+            Kind::Quantization | Kind::White | Kind::Oscillation => false,
+            Kind::BiasInstability | Kind::GaussMarkov | Kind::RateRandomWalk | Kind::RateRamp => true,
+        }
+    }
 }
 
 /// One noise process with SI coefficients.
@@ -34,10 +48,24 @@ pub enum Kind {
 pub enum Term {
     Quantization { coefficient: f64 },
     White { density: f64 },
+    Oscillation { std_dev: f64, frequency_hz: f64, correlation_time: f64 },
     BiasInstability { coefficient: f64 },
     GaussMarkov { std_dev: f64, correlation_time: f64 },
     RateRandomWalk { density: f64 },
     RateRamp { slope: f64 },
+}
+
+/// A line that a log of this rate cannot show where it is.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "oscillation at {} Hz is not below half the sample rate of {} Hz; give the frequency at which it stands in the log ({} Hz), \
+     or a higher rate",
+    digits(*.frequency_hz), digits(1.0 / .dt), digits((.frequency_hz - (.frequency_hz * .dt).round() / .dt).abs())
+)]
+pub struct TooFast {
+    pub frequency_hz: f64,
+    /// s.
+    pub dt: f64,
 }
 
 /// Independent processes that add.
@@ -70,6 +98,7 @@ impl Term {
         match self {
             Term::Quantization { .. } => Kind::Quantization,
             Term::White { .. } => Kind::White,
+            Term::Oscillation { .. } => Kind::Oscillation,
             Term::BiasInstability { .. } => Kind::BiasInstability,
             Term::GaussMarkov { .. } => Kind::GaussMarkov,
             Term::RateRandomWalk { .. } => Kind::RateRandomWalk,
@@ -82,6 +111,9 @@ impl Term {
         match *self {
             Term::Quantization { coefficient } => quantization::psd(coefficient, f_hz, dt),
             Term::White { density } => white::psd(density),
+            Term::Oscillation { std_dev, frequency_hz, correlation_time } => {
+                oscillation::psd(std_dev, frequency_hz, correlation_time, f_hz, dt)
+            }
             Term::BiasInstability { coefficient } => bias_instability::psd(coefficient, f_hz, dt),
             Term::GaussMarkov { std_dev, correlation_time } => gauss_markov::psd(std_dev, correlation_time, f_hz, dt),
             Term::RateRandomWalk { density } => random_walk::psd(density, f_hz, dt),
@@ -95,6 +127,9 @@ impl Term {
         match *self {
             Term::Quantization { coefficient } => quantization::allan_variance(coefficient, m, dt),
             Term::White { density } => white::allan_variance(density, m, dt),
+            Term::Oscillation { std_dev, frequency_hz, correlation_time } => {
+                oscillation::allan_variance(std_dev, frequency_hz, correlation_time, m, dt)
+            }
             Term::BiasInstability { coefficient } => bias_instability::allan_variance(coefficient, m),
             Term::GaussMarkov { std_dev, correlation_time } => {
                 gauss_markov::allan_variance(std_dev, correlation_time, m, dt)
@@ -109,6 +144,9 @@ impl Term {
         match *self {
             Term::Quantization { coefficient } => Some(quantization::autocovariance(coefficient, lag, dt)),
             Term::White { density } => Some(white::autocovariance(density, lag, dt)),
+            Term::Oscillation { std_dev, frequency_hz, correlation_time } => {
+                Some(oscillation::autocovariance(std_dev, frequency_hz, correlation_time, lag, dt))
+            }
             Term::GaussMarkov { std_dev, correlation_time } => {
                 Some(gauss_markov::autocovariance(std_dev, correlation_time, lag, dt))
             }
@@ -118,7 +156,8 @@ impl Term {
 
     /// r_h = cov(z_k, z_{k+h}), z_k = θ_{k+2m} − 2θ_{k+m} + θ_k with θ the running sum of samples times dt: what the exact
     /// degrees of freedom need. r_0 = 2 m² dt² · allan_variance(m), except for the ramp: it has no covariance (0), z_k is the
-    /// constant slope · m² dt². Error below 1e-10 r_0 for all m, h below 10¹².
+    /// constant slope · m² dt². Error below 1e-10 r_0 for all m, h below 10¹²,
+    /// of an oscillation with whole turns in m relative to its other r_0.
     pub fn second_difference_autocovariance(&self, m: u64, h: u64, dt: f64) -> f64 {
         self.second_difference_cross_covariance(m, m, h.min(i64::MAX as u64) as i64, dt)
     }
@@ -128,6 +167,9 @@ impl Term {
         match *self {
             Term::Quantization { coefficient } => quantization::second_difference(coefficient, m1, m2, h),
             Term::White { density } => white::second_difference(density, m1, m2, h, dt),
+            Term::Oscillation { std_dev, frequency_hz, correlation_time } => {
+                oscillation::second_difference([std_dev, frequency_hz, correlation_time], m1, m2, h, dt)
+            }
             Term::BiasInstability { coefficient } => bias_instability::second_difference(coefficient, m1, m2, h, dt),
             Term::GaussMarkov { std_dev, correlation_time } => {
                 gauss_markov::second_difference(std_dev, correlation_time, m1, m2, h, dt)
@@ -143,6 +185,9 @@ impl Term {
         match *self {
             Term::Quantization { coefficient } => Some(quantization::realisation(coefficient, dt)),
             Term::White { .. } => None,
+            Term::Oscillation { std_dev, frequency_hz, correlation_time } => {
+                Some(oscillation::realisation(std_dev, frequency_hz, correlation_time, dt))
+            }
             Term::BiasInstability { coefficient } => Some(bias_instability::realisation(coefficient, dt, horizon_s)),
             Term::GaussMarkov { std_dev, correlation_time } => {
                 Some(gauss_markov::realisation(std_dev, correlation_time, dt))
@@ -158,6 +203,9 @@ impl Term {
         match *self {
             Term::Quantization { coefficient } => Box::new(quantization::Path::new(coefficient, dt, rng)),
             Term::White { density } => Box::new(white::Path::new(density, dt, rng)),
+            Term::Oscillation { std_dev, frequency_hz, correlation_time } => {
+                Box::new(oscillation::Path::new(std_dev, frequency_hz, correlation_time, dt, rng))
+            }
             Term::BiasInstability { coefficient } => Box::new(bias_instability::Path::new(coefficient, rng)),
             Term::GaussMarkov { std_dev, correlation_time } => {
                 Box::new(gauss_markov::Path::new(std_dev, correlation_time, dt, rng))
@@ -169,6 +217,15 @@ impl Term {
 }
 
 impl NoiseModel {
+    /// Every line is below half the sample rate 1/dt. The sampled forms hold above it too, but a document with a line up there is
+    /// most likely in error.
+    pub fn check_rate(&self, dt: f64) -> Result<(), TooFast> {
+        let fast = self.terms.iter().find_map(|term| match *term {
+            Term::Oscillation { frequency_hz, .. } if frequency_hz * dt >= 0.5 => Some(frequency_hz),
+            _ => None,
+        });
+        fast.map_or(Ok(()), |frequency_hz| Err(TooFast { frequency_hz, dt }))
+    }
     pub fn psd(&self, f_hz: f64, dt: f64) -> f64 {
         self.terms.iter().map(|t| t.psd(f_hz, dt)).sum()
     }

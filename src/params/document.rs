@@ -12,8 +12,8 @@ use crate::units::{Dimension, Quantity, Unit};
 
 pub(super) const FORMAT: &str = "kfdesign-params/1";
 
-const TERM_KEYS: [&str; 6] =
-    ["quantization", "white", "bias_instability", "gauss_markov", "rate_random_walk", "rate_ramp"];
+const TERM_KEYS: [&str; 7] =
+    ["quantization", "white", "oscillation", "bias_instability", "gauss_markov", "rate_random_walk", "rate_ramp"];
 
 #[derive(Serialize, JsonSchema)]
 enum Format {
@@ -54,6 +54,9 @@ struct AxisDocument {
     /// Root of the two-sided power spectral density.
     #[serde(skip_serializing_if = "Option::is_none")]
     white: Option<OneOrMany<Density>>,
+    /// Vibration lines.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    oscillation: Option<OneOrMany<Oscillation>>,
     /// Flicker: the Allan deviation's floor is 0.664 times the coefficient.
     #[serde(skip_serializing_if = "Option::is_none")]
     bias_instability: Option<OneOrMany<Coefficient>>,
@@ -97,6 +100,16 @@ struct Coefficient {
 #[serde(deny_unknown_fields)]
 struct Slope {
     slope: Measured,
+}
+
+/// Second-order Gauss-Markov process: autocovariance std_dev² exp(−|τ|/correlation_time) cos(2π frequency τ).
+#[derive(Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Oscillation {
+    std_dev: Measured,
+    /// Below half the sample rate.
+    frequency: Measured,
+    correlation_time: Measured,
 }
 
 /// First-order Gauss-Markov process: stationary standard deviation and 1/e correlation time.
@@ -150,14 +163,23 @@ fn one_or_many<T>(mut items: Vec<T>) -> Option<OneOrMany<T>> {
     if items.len() > 1 { Some(OneOrMany::Many(items)) } else { items.pop().map(OneOrMany::One) }
 }
 
+/// A list even of one.
+fn list<T>(items: Vec<T>) -> Option<OneOrMany<T>> {
+    (!items.is_empty()).then_some(OneOrMany::Many(items))
+}
+
 impl From<&AxisParams> for AxisDocument {
     fn from(axis: &AxisParams) -> Self {
         let (mut quantization, mut white, mut bias_instability) = (Vec::new(), Vec::new(), Vec::new());
+        let mut oscillation = Vec::new();
         let (mut gauss_markov, mut rate_random_walk, mut rate_ramp) = (Vec::new(), Vec::new(), Vec::new());
         for term in axis.terms.iter().cloned() {
             match term {
                 TermEntry::Quantization { coefficient } => quantization.push(Coefficient { coefficient }),
                 TermEntry::White { density } => white.push(Density { density }),
+                TermEntry::Oscillation { std_dev, frequency, correlation_time } => {
+                    oscillation.push(Oscillation { std_dev, frequency, correlation_time });
+                }
                 TermEntry::BiasInstability { coefficient } => bias_instability.push(Coefficient { coefficient }),
                 TermEntry::GaussMarkov { std_dev, correlation_time } => {
                     gauss_markov.push(GaussMarkov { std_dev, correlation_time });
@@ -172,8 +194,9 @@ impl From<&AxisParams> for AxisDocument {
             turn_on_bias: axis.turn_on_bias.clone().map(|std_dev| StdDev { std_dev }),
             quantization: one_or_many(quantization),
             white: one_or_many(white),
+            oscillation: list(oscillation),
             bias_instability: one_or_many(bias_instability),
-            gauss_markov: (!gauss_markov.is_empty()).then_some(OneOrMany::Many(gauss_markov)),
+            gauss_markov: list(gauss_markov),
             rate_random_walk: one_or_many(rate_random_walk),
             rate_ramp: one_or_many(rate_ramp),
             not_identified: axis
@@ -300,6 +323,14 @@ fn term(key: &str, place: &Place<'_>, base: Dimension) -> Result<TermEntry, KeyE
             coefficient: positive(&place.object(&["coefficient"])?, "coefficient", base.times_time(2))?,
         },
         "white" => TermEntry::White { density: positive(&place.object(&["density"])?, "density", base.times_time(1))? },
+        "oscillation" => {
+            let object = place.object(&["std_dev", "frequency", "correlation_time"])?;
+            TermEntry::Oscillation {
+                std_dev: positive(&object, "std_dev", base)?,
+                frequency: positive(&object, "frequency", Dimension::FREQUENCY)?,
+                correlation_time: positive(&object, "correlation_time", Dimension::TIME)?,
+            }
+        }
         "bias_instability" => {
             TermEntry::BiasInstability { coefficient: positive(&place.object(&["coefficient"])?, "coefficient", base)? }
         }

@@ -23,6 +23,7 @@ use place::{KeyError, Place};
 pub enum TermEntry {
     Quantization { coefficient: Measured },
     White { density: Measured },
+    Oscillation { std_dev: Measured, frequency: Measured, correlation_time: Measured },
     BiasInstability { coefficient: Measured },
     GaussMarkov { std_dev: Measured, correlation_time: Measured },
     RateRandomWalk { density: Measured },
@@ -111,6 +112,10 @@ impl TermEntry {
         match self {
             TermEntry::Quantization { coefficient } => ("quantization", vec![("coefficient", coefficient)]),
             TermEntry::White { density } => ("white", vec![("density", density)]),
+            TermEntry::Oscillation { std_dev, frequency, correlation_time } => {
+                let values = [("std_dev", std_dev), ("frequency", frequency), ("correlation_time", correlation_time)];
+                ("oscillation", values.into())
+            }
             TermEntry::BiasInstability { coefficient } => ("bias_instability", vec![("coefficient", coefficient)]),
             TermEntry::GaussMarkov { std_dev, correlation_time } => {
                 ("gauss_markov", vec![("std_dev", std_dev), ("correlation_time", correlation_time)])
@@ -125,6 +130,11 @@ impl TermEntry {
         match self {
             TermEntry::Quantization { coefficient } => Term::Quantization { coefficient: coefficient.si() },
             TermEntry::White { density } => Term::White { density: density.si() },
+            TermEntry::Oscillation { std_dev, frequency, correlation_time } => Term::Oscillation {
+                std_dev: std_dev.si(),
+                frequency_hz: frequency.si(),
+                correlation_time: correlation_time.si(),
+            },
             TermEntry::BiasInstability { coefficient } => Term::BiasInstability { coefficient: coefficient.si() },
             TermEntry::GaussMarkov { std_dev, correlation_time } => {
                 Term::GaussMarkov { std_dev: std_dev.si(), correlation_time: correlation_time.si() }
@@ -139,7 +149,7 @@ impl AxisParams {
     /// The unit of the quantity in which the parameters of this axis are written, else deg/s or m/s^2.
     pub fn display_unit(&self, quantity: Quantity) -> Unit {
         let terms = self.terms.iter().filter_map(|term| match term {
-            TermEntry::GaussMarkov { std_dev, .. } => Some(std_dev),
+            TermEntry::GaussMarkov { std_dev, .. } | TermEntry::Oscillation { std_dev, .. } => Some(std_dev),
             TermEntry::BiasInstability { coefficient } => Some(coefficient),
             _ => None,
         });

@@ -16,6 +16,7 @@
 //! | Gauss–Markov | 0x4_0000 + i |
 //! | rate random walk | 0x5_0000 + i |
 //! | rate ramp (draws nothing) | 0x6_0000 + i |
+//! | oscillation | 0x7_0000 + i |
 //!
 //! with i counting the terms of that kind on the axis from 0. Adding an axis, a term of another kind or a later term of
 //! the same kind changes no other number.
@@ -68,7 +69,7 @@ pub struct AxisBlock {
     pub true_rate: Vec<f64>,
     /// Constant bias, with the turn-on bias if it was drawn.
     pub bias: f64,
-    /// Sum of all drift terms: everything that is neither true rate, constant bias, white nor quantisation noise.
+    /// Sum of all drift terms ([`Kind::is_drift`]): everything that is neither true rate, constant bias nor noise of the measurement.
     pub drift: Vec<f64>,
     /// Per term of the axis (order of `AxisParams::terms`), its contribution.
     pub terms: Vec<Vec<f64>>,
@@ -95,16 +96,14 @@ pub fn term_number(kind: Kind, index: u32) -> u32 {
         Kind::GaussMarkov => 4,
         Kind::RateRandomWalk => 5,
         Kind::RateRamp => 6,
+        // later kinds come after the earlier ones, whose numbers stay
+        Kind::Oscillation => 7,
     };
     (code << 16) + index
 }
 
 /// Term number of the turn-on bias.
 pub const TURN_ON_BIAS: u32 = 1;
-
-fn is_drift(kind: Kind) -> bool {
-    !matches!(kind, Kind::White | Kind::Quantization)
-}
 
 impl Scenario {
     /// Whether it can be run for that many axes.
@@ -155,10 +154,13 @@ impl Scenario {
 }
 
 impl Simulator {
-    /// A simulator at its first sample.
+    /// A simulator at its first sample. Errors: the scenario does not fit, or a line is not below half its sample rate.
     pub fn new(params: &Params, scenario: &Scenario) -> Result<Simulator, SimulateError> {
         scenario.check(params.axes.len())?;
         let dt = 1.0 / scenario.rate_hz;
+        for axis in &params.axes {
+            axis.noise().check_rate(dt).map_err(|e| SimulateError(format!("axis '{}': {e}", axis.name)))?;
+        }
         let axes = (0..).zip(&params.axes).map(|(i, axis)| AxisGenerator::new(axis, i, scenario, dt)).collect();
         Ok(Simulator { axes, scenario: scenario.clone(), next: 0 })
     }
@@ -213,7 +215,7 @@ impl AxisGenerator {
             for (measured, value) in block.measured.iter_mut().zip(values.iter()) {
                 *measured += value;
             }
-            if is_drift(*kind) {
+            if kind.is_drift() {
                 for (drift, value) in block.drift.iter_mut().zip(values.iter()) {
                     *drift += value;
                 }

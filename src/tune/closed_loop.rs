@@ -24,10 +24,12 @@ pub struct Share {
     pub share: f64,
 }
 
-/// The states that stay uncertain: those of driven processes. The others are learnt for good.
+/// The states that stay uncertain: those of driven processes. The others are learnt for good. None if no drift is among them.
 fn driven(model: &LinearModel) -> Vec<usize> {
     let undriven = undriven_states(model);
-    (0..model.states.len()).filter(|i| !undriven.contains(i)).collect()
+    let driven: Vec<usize> = (0..model.states.len()).filter(|i| !undriven.contains(i)).collect();
+    let drift = drift_row(model);
+    if driven.iter().any(|&i| drift[(0, i)] != 0.0) { driven } else { Vec::new() }
 }
 
 /// The part of a matrix with these rows and columns.
@@ -36,11 +38,11 @@ fn part(a: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
 }
 
 /// The noise term that drives a state.
-fn source(state: &str) -> &str {
+fn source(state: &str) -> String {
     match state.split_once('.') {
-        _ if state == "bias" => "rate_random_walk",
-        Some((chain @ ("bias_instability" | "quantization" | "rate_ramp"), _)) => chain,
-        _ => state,
+        _ if state == "bias" => "rate_random_walk".into(),
+        Some((chain @ ("bias_instability" | "quantization" | "rate_ramp"), _)) => chain.into(),
+        _ => state.replace(".quadrature", ""),
     }
 }
 
@@ -67,7 +69,7 @@ pub fn error_budget(model: &LinearModel, steady: &SteadyState) -> Result<Vec<Sha
     };
     let mut shares =
         vec![Share { source: "white".into(), variance_si: variance(&k * &model.r * k.transpose())?, share: 0.0 }];
-    let mut sources: Vec<&str> = kept.iter().map(|&i| source(&model.states[i].name)).collect();
+    let mut sources: Vec<String> = kept.iter().map(|&i| source(&model.states[i].name)).collect();
     let of_state = sources.clone();
     sources.dedup();
     for name in sources {
@@ -75,7 +77,7 @@ pub fn error_budget(model: &LinearModel, steady: &SteadyState) -> Result<Vec<Sha
             if of_state[i] == name && of_state[j] == name { q[(i, j)] } else { 0.0 }
         });
         let variance_si = variance(&keep * q_i * keep.transpose())?;
-        shares.push(Share { source: name.to_string(), variance_si, share: 0.0 });
+        shares.push(Share { source: name, variance_si, share: 0.0 });
     }
     let total: f64 = shares.iter().map(|s| s.variance_si).sum();
     for share in &mut shares {

@@ -17,7 +17,7 @@ use serde_json::json;
 use crate::filter::steady_state::{SteadyStateError, steady_state};
 use crate::filter::{AxisDesign, FilterDesign};
 use crate::model::{LinearModel, ModelError, Plant};
-use crate::noise::Term;
+use crate::noise::TooFast;
 use crate::numerics::linalg::LinalgError;
 use crate::params::{AxisParams, Params};
 use crate::units::Quantity;
@@ -48,6 +48,8 @@ pub enum TuneError {
          give axes[].white.density (its unit is like deg/s/sqrt(Hz))"
     )]
     NoMeasurementNoise { axis: String },
+    #[error("axis '{axis}': {line}")]
+    TooFast { axis: String, line: TooFast },
     #[error("axis '{axis}': {source}")]
     Model { axis: String, source: ModelError },
     #[error("axis '{axis}': {source}")]
@@ -91,10 +93,11 @@ pub struct Tuned {
 
 /// The augmented Kalman filter of every axis of `params`.
 ///
-/// States are the constant bias and those of each drift process, discretised exactly; R = N²/dt; P0 of the bias is the turn-on bias, that
+/// States are the constant bias and those of each process, discretised exactly; R = N²/dt; P0 of the bias is the turn-on bias, that
 /// of a process its stationary variance. A rate random walk has the same dynamics as the constant bias and shares its state;
-/// flicker is a chain of Gauss-Markov states.
-/// Errors: no white noise, or a model without a steady state.
+/// flicker is a chain of Gauss-Markov states. Lines and quantisation are noise of the measurement: they have states, but are no
+/// part of the drift.
+/// Errors: no white noise, a line not below half the sample rate, or a model without a steady state.
 pub fn tune(params: &Params, options: &TuneOptions) -> Result<Tuned, TuneError> {
     let mut axes = Vec::with_capacity(params.axes.len());
     let mut reports = Vec::with_capacity(params.axes.len());
@@ -138,7 +141,7 @@ fn tune_axis(
 ) -> Result<(AxisDesign, AxisReport), TuneError> {
     let dt = 1.0 / sample_rate_hz;
     let mut sensor = sensor::build(axis, quantity, dt, options)?;
-    if axis.noise().terms.iter().all(|term| matches!(term, Term::White { .. })) {
+    if !axis.noise().terms.iter().any(|term| term.kind().is_drift()) {
         sensor.warnings.push(
             "the parameters have no drift process: the filter averages for ever and its gain tends to zero; a real sensor drifts"
                 .into(),

@@ -11,8 +11,8 @@ use crate::numerics::linalg::LinalgError;
 use crate::params::AxisParams;
 use crate::units::{Quantity, digits};
 
-/// Correlation times closer than this, relatively, are one process to any filter.
-const SAME_TIME: f64 = 1e-6;
+/// Correlation times and frequencies closer than this, relatively, are one process to any filter.
+const SAME: f64 = 1e-6;
 
 /// A model with the decisions that led to it.
 #[derive(Clone, Debug)]
@@ -31,6 +31,7 @@ pub(super) fn build(
 ) -> Result<Sensor, TuneError> {
     let failed = |source| match source {
         ModelError::NoMeasurementNoise => TuneError::NoMeasurementNoise { axis: axis.name.clone() },
+        ModelError::TooFast(line) => TuneError::TooFast { axis: axis.name.clone(), line },
         source => TuneError::Model { axis: axis.name.clone(), source },
     };
     let mut warnings = Vec::new();
@@ -75,10 +76,11 @@ pub(super) fn drift_sigma(model: &LinearModel, p: &DMatrix<f64>) -> f64 {
     (&d * p * d.transpose())[(0, 0)].max(0.0).sqrt()
 }
 
-/// H without quantisation, which is noise of the measurement although it needs states.
+/// H without quantisation and oscillation, which are noise of the measurement although they need states.
 pub(super) fn drift_row(model: &LinearModel) -> DMatrix<f64> {
     DMatrix::from_fn(1, model.states.len(), |_, j| {
-        if model.states[j].name.starts_with("quantization") { 0.0 } else { model.h[(0, j)] }
+        let measured = ["quantization", "oscillation"].iter().any(|kind| model.states[j].name.starts_with(kind));
+        if measured { 0.0 } else { model.h[(0, j)] }
     })
 }
 
@@ -97,7 +99,7 @@ pub(super) fn observability_sentences(model: &LinearModel) -> Result<Vec<String>
 fn turn_on_rule(model: &LinearModel, mean: f64) -> (f64, &'static str) {
     // P0 of the bias is still zero, so this is the stationary variance of the drift
     let drift = 3.0 * drift_sigma(model, &model.p0);
-    let sample = 10.0 * model.r[(0, 0)].sqrt();
+    let sample = 10.0 * (&model.h * &model.p0 * model.h.transpose() + &model.r)[(0, 0)].sqrt();
     if mean.abs() >= drift && mean != 0.0 {
         (mean.abs(), "the size of the given bias")
     } else if drift > 0.0 {
@@ -125,6 +127,7 @@ fn merged(noise: &NoiseModel, warnings: &mut Vec<String>) -> NoiseModel {
 
 /// The one term that two of the same dynamics amount to.
 fn together(a: &Term, b: &Term) -> Option<Term> {
+    let same = |x: f64, y: f64| (y / x - 1.0).abs() < SAME;
     match (*a, *b) {
         (Term::White { density: x }, Term::White { density: y }) => Some(Term::White { density: x.hypot(y) }),
         (Term::RateRandomWalk { density: x }, Term::RateRandomWalk { density: y }) => {
@@ -136,13 +139,17 @@ fn together(a: &Term, b: &Term) -> Option<Term> {
         (Term::Quantization { coefficient: x }, Term::Quantization { coefficient: y }) => {
             Some(Term::Quantization { coefficient: x.hypot(y) })
         }
+        (
+            Term::Oscillation { std_dev: x, frequency_hz, correlation_time },
+            Term::Oscillation { std_dev: y, frequency_hz: other, correlation_time: time },
+        ) if same(frequency_hz, other) && same(correlation_time, time) => {
+            Some(Term::Oscillation { std_dev: x.hypot(y), frequency_hz, correlation_time })
+        }
         (Term::RateRamp { slope: x }, Term::RateRamp { slope: y }) => Some(Term::RateRamp { slope: x + y }),
         (
             Term::GaussMarkov { std_dev: x, correlation_time },
             Term::GaussMarkov { std_dev: y, correlation_time: other },
-        ) if (other / correlation_time - 1.0).abs() < SAME_TIME => {
-            Some(Term::GaussMarkov { std_dev: x.hypot(y), correlation_time })
-        }
+        ) if same(correlation_time, other) => Some(Term::GaussMarkov { std_dev: x.hypot(y), correlation_time }),
         _ => None,
     }
 }
@@ -151,6 +158,7 @@ fn name(kind: Kind) -> &'static str {
     match kind {
         Kind::Quantization => "quantization",
         Kind::White => "white",
+        Kind::Oscillation => "oscillation",
         Kind::BiasInstability => "bias_instability",
         Kind::GaussMarkov => "gauss_markov",
         Kind::RateRandomWalk => "rate_random_walk",

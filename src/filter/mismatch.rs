@@ -34,9 +34,9 @@ pub struct ExpectedError {
 /// Normalised innovations y = ν/√S of one measurement over the whole run, S as the filter claims it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExpectedInnovations {
-    /// Mean over the updates of E[y²]: 1 when the filter is right.
+    /// Mean over the updates of `E[y²]`: 1 when the filter is right.
     pub nis: f64,
-    /// Mean over the updates of E[y].
+    /// Mean over the updates of `E[y]`.
     pub mean: f64,
     /// For each block length L: mean over the complete blocks of E[(Σ y)²/L], 1 when the filter is right; NaN when no block is complete.
     pub blocks: Vec<f64>,

@@ -1,7 +1,7 @@
 //! What the gate would see: the power of its tests against a wrong parameter, from the exact covariance analysis.
 //!
 //! The filter under test is held fixed and the truth is moved: "factor 2" means that the filter's value is twice the true one. Means and
-//! variances of the statistics are exact ([`mismatch::expect`]) but for two approximations: the variance of sums over time takes
+//! variances of the statistics are exact ([`crate::filter::mismatch::expect`]) but for two approximations: the variance of sums over time takes
 //! the correlation that the statistics have for a true filter, and sums of squares have the scaled χ² law of their first two moments. The probability that the
 //! gate rejects is at least that of its most powerful test, which is what is given.
 

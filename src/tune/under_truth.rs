@@ -61,10 +61,10 @@ pub struct UnderTruth {
     pub drift: ErrorOverTime,
     /// Every state, in the order of the model; empty when the truth has other states.
     pub states: Vec<ErrorOverTime>,
-    /// E[NEES] at each time, divided by its number of components: 1 as claimed; null where the filter claims to know something exactly. Of all states,
+    /// `E[NEES]` at each time, divided by its number of components: 1 as claimed; null where the filter claims to know something exactly. Of all states,
     /// or of the whole drift when the truth has other states.
     pub nees: Vec<Option<f64>>,
-    /// E[NIS], mean over all measurements: 1 as claimed.
+    /// `E[NIS]`, mean over all measurements: 1 as claimed.
     pub nis: f64,
     pub tendency: Tendency,
     /// The same as a sentence.

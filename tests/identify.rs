@@ -457,15 +457,29 @@ fn model_names() {
     assert_eq!(kinds("rrw + white"), [Kind::White, Kind::RateRandomWalk]);
     assert_eq!(kinds("white+gm+gm").len(), 3);
     assert_eq!(kinds("white+bias_instability"), kinds("white+flicker"));
+    assert_eq!(kinds("osc+white+ma+osc"), kinds("oscillation+oscillation+moving_average+white"));
     for (bad, words) in [
         ("white+pink", "unknown term 'pink'"),
         ("gm", "white must be part"),
         ("white+rrw+rrw", "stands twice"),
         ("white+gm+gm+gm+gm", "more than three"),
+        ("white+ma+ma", "stands twice"),
         ("", "unknown term ''"),
     ] {
         let error = parse_model(bad).unwrap_err().to_string();
         assert!(error.contains(words), "{bad}: {error}");
+    }
+}
+
+/// An Allan curve has nothing to fit them to.
+#[test]
+fn averages_and_lines_are_not_fitted_to_the_curve() {
+    let rate = log(&[white(N)], 1000, 0.01, 1, 0);
+    for (model, name) in [("white+ma", "ma"), ("white+gm+osc", "osc")] {
+        let unit = Unit::parse("deg/s").unwrap();
+        let error = identify_axis("x", &rate, 0.01, &unit, Method::Allan, &parse_model(model).unwrap()).unwrap_err();
+        let expected = format!("x: {name} needs --method likelihood");
+        assert!(error.to_string().starts_with(&expected), "{error}");
     }
 }
 

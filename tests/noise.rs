@@ -3,6 +3,7 @@
 #[allow(clippy::excessive_precision, clippy::approx_constant, reason = "17 digits, as the oracle printed them")]
 mod vectors;
 
+mod average;
 mod line;
 
 use kfdesign::noise::Term;
@@ -16,9 +17,10 @@ const GAUSS_MARKOV: Term = Term::GaussMarkov { std_dev: 0.03, correlation_time: 
 const QUANTIZATION: Term = Term::Quantization { coefficient: 1e-3 };
 const FLICKER: Term = Term::BiasInstability { coefficient: 0.013 };
 const LINE: Term = Term::Oscillation { std_dev: 0.03, frequency_hz: 20.3, correlation_time: 0.5 };
+const AVERAGE: Term = Term::MovingAverage { density: 0.0562, samples: 3 };
 const RANDOM_WALK: Term = Term::RateRandomWalk { density: 2.85e-3 };
 const RAMP: Term = Term::RateRamp { slope: 2e-4 };
-const ALL: [Term; 7] = [WHITE, GAUSS_MARKOV, QUANTIZATION, FLICKER, LINE, RANDOM_WALK, RAMP];
+const ALL: [Term; 8] = [WHITE, AVERAGE, GAUSS_MARKOV, QUANTIZATION, FLICKER, LINE, RANDOM_WALK, RAMP];
 
 fn assert_relative(found: f64, expected: f64, tolerance: f64, what: &str) {
     assert!((found - expected).abs() <= tolerance * expected.abs(), "{what}: {found:e}, expected {expected:e}");
@@ -120,7 +122,7 @@ mod allan_curve {
     #[test]
     fn equals_the_integral_of_the_spectrum() {
         let gauss_markov = Term::GaussMarkov { std_dev: 0.03, correlation_time: 0.5 };
-        for term in [WHITE, gauss_markov, QUANTIZATION, FLICKER, LINE, RANDOM_WALK] {
+        for term in [WHITE, AVERAGE, gauss_markov, QUANTIZATION, FLICKER, LINE, RANDOM_WALK] {
             for m in [1, 2, 3, 10, 64] {
                 let integral = 4.0
                     * integrate(0.0, 0.5 / DT, 400 * m as usize, |f| {
@@ -137,7 +139,7 @@ mod allan_curve {
     #[test]
     fn spectrum_integrates_to_the_autocovariance() {
         let gauss_markov = Term::GaussMarkov { std_dev: 0.03, correlation_time: 0.05 };
-        for term in [WHITE, gauss_markov, QUANTIZATION, LINE] {
+        for term in [WHITE, AVERAGE, gauss_markov, QUANTIZATION, LINE] {
             for lag in [0, 1, 2, 7] {
                 let integral = 2.0
                     * integrate(0.0, 0.5 / DT, 400, |f| {
@@ -222,7 +224,7 @@ mod second_difference {
                 _ => term.autocovariance(l, DT).unwrap(),
             }
         };
-        for term in [WHITE, GAUSS_MARKOV, fast, very_fast, QUANTIZATION, FLICKER, LINE, RANDOM_WALK] {
+        for term in [WHITE, AVERAGE, GAUSS_MARKOV, fast, very_fast, QUANTIZATION, FLICKER, LINE, RANDOM_WALK] {
             for (m1, m2) in [(1, 1), (1, 2), (2, 1), (3, 3), (5, 12), (12, 5), (1, 25), (20, 20)] {
                 let scale = (term.second_difference_autocovariance(m1, 0, DT)
                     * term.second_difference_autocovariance(m2, 0, DT))
@@ -243,7 +245,7 @@ mod second_difference {
 
     #[test]
     fn is_twice_the_allan_variance_at_lag_zero() {
-        for term in [WHITE, GAUSS_MARKOV, QUANTIZATION, FLICKER, LINE, RANDOM_WALK] {
+        for term in [WHITE, AVERAGE, GAUSS_MARKOV, QUANTIZATION, FLICKER, LINE, RANDOM_WALK] {
             for m in [1, 2, 3, 17, 1000, 123_457, 10_000_000] {
                 let expected = 2.0 * (m as f64 * DT).powi(2) * term.allan_variance(m, DT);
                 let found = term.second_difference_autocovariance(m, 0, DT);
@@ -281,7 +283,7 @@ mod second_difference {
 
     #[test]
     fn is_symmetric_and_vanishes_far_away() {
-        for term in [WHITE, GAUSS_MARKOV, QUANTIZATION, FLICKER, LINE, RANDOM_WALK] {
+        for term in [WHITE, AVERAGE, GAUSS_MARKOV, QUANTIZATION, FLICKER, LINE, RANDOM_WALK] {
             for (m1, m2, h) in [(3, 8, 5), (3, 8, -5), (1000, 7, 900), (12, 12, 3)] {
                 let a = term.second_difference_cross_covariance(m1, m2, h, DT);
                 let b = term.second_difference_cross_covariance(m2, m1, -h, DT);
@@ -321,7 +323,7 @@ mod realisation {
     #[test]
     fn has_the_allan_variance_of_the_process() {
         let fast = Term::GaussMarkov { std_dev: 0.03, correlation_time: 0.05 };
-        for term in [fast, QUANTIZATION, LINE, RANDOM_WALK, RAMP, FLICKER] {
+        for term in [fast, QUANTIZATION, AVERAGE, LINE, RANDOM_WALK, RAMP, FLICKER] {
             // flicker is a chain of states: 1 % between dt and the horizon
             let tolerance = if term == FLICKER { 1e-2 } else { 1e-11 };
             for m in [1, 2, 3, 10, 30] {
@@ -336,7 +338,7 @@ mod realisation {
     /// h Φ^k P0 hᵀ is the autocovariance, and P0 the fixed point of the covariance recursion.
     #[test]
     fn starts_in_its_stationary_law() {
-        for term in [GAUSS_MARKOV, QUANTIZATION, LINE, FLICKER] {
+        for term in [GAUSS_MARKOV, QUANTIZATION, AVERAGE, LINE, FLICKER] {
             let r = term.realisation(DT, 1000.0).unwrap();
             let next: DMatrix<f64> = &r.phi * &r.p0 * r.phi.transpose() + &r.q;
             assert!((&next - &r.p0).amax() <= 1e-15 * r.p0.amax(), "{term:?} is not stationary");
@@ -387,12 +389,12 @@ mod sample_path {
         (sum / count as f64 / (2.0 * (m as f64 * DT).powi(2)), edf)
     }
 
-    /// False alarm: 1e-6 for each of the 28 points (chi-square with at least 130 equivalent degrees of freedom).
+    /// False alarm: 1e-6 for each of the 32 points (chi-square with at least 130 equivalent degrees of freedom).
     #[test]
     fn has_the_allan_curve() {
         let fast = Term::GaussMarkov { std_dev: 0.03, correlation_time: 0.05 };
         for (seed, term) in
-            [WHITE, GAUSS_MARKOV, fast, QUANTIZATION, FLICKER, RANDOM_WALK, LINE].into_iter().enumerate()
+            [WHITE, GAUSS_MARKOV, fast, QUANTIZATION, FLICKER, RANDOM_WALK, LINE, AVERAGE].into_iter().enumerate()
         {
             let y = path(term, seed as u64, 200_000);
             for m in [1, 4, 40, 400] {

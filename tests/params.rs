@@ -78,6 +78,10 @@ fn writing_and_reading_gives_the_same_document() {
                 terms: vec![
                     TermEntry::Quantization { coefficient: measured(1e-6, "m/s", None) },
                     TermEntry::White { density: measured(0.1 + 0.2, "µg/√Hz", Some([0.1, 0.7])) },
+                    TermEntry::MovingAverage {
+                        density: measured(90.0, "ug/sqrt(Hz)", Some([80.0, 99.0])),
+                        samples: 64,
+                    },
                     TermEntry::Oscillation {
                         std_dev: measured(3.0, "mg", None),
                         frequency: measured(20.0, "Hz", Some([19.5, 20.5])),
@@ -123,6 +127,8 @@ fn writing_and_reading_gives_the_same_document() {
 fn each_complaint_names_file_key_and_reason() {
     let white = |density: Value| with("/axes/0/white", json!({ "density": density }));
     let gauss_markov = |term: Value| with("/axes/0/gauss_markov", json!([term]));
+    let average =
+        |samples: Value| with("/axes/0/moving_average", json!({"density": "1 deg/s/√Hz", "samples": samples}));
     let line = |key: &str, value: Value| {
         let mut term = json!({"std_dev": "1 deg/s", "frequency": "20 Hz", "correlation_time": "3 s"});
         term[key] = value;
@@ -177,6 +183,14 @@ fn each_complaint_names_file_key_and_reason() {
         (gauss_markov(json!({"std_dev": "1 deg/s"})), "axes[0].gauss_markov[0].correlation_time: ", "missing"),
         (gauss_markov(json!({"std_dev": "1 deg/s", "correlation_time": "0 s"})), "axes[0].gauss_markov[0].correlation_time: ", "greater than zero"),
         (gauss_markov(json!({"std_dev": "1 deg/s", "correlation_time": "1 Hz"})), "axes[0].gauss_markov[0].correlation_time: ", "expected a time"),
+        (average(json!(1)), "axes[0].moving_average.samples: ", "found 1, expected 2 to 64"),
+        (average(json!(65)), "axes[0].moving_average.samples: ", "found 65, expected 2 to 64"),
+        (average(json!(2.5)), "axes[0].moving_average.samples: ", "whole number"),
+        (average(json!(-2)), "axes[0].moving_average.samples: ", "whole number"),
+        (average(json!("2")), "axes[0].moving_average.samples: ", "whole number"),
+        (average(json!(null)), "axes[0].moving_average.samples: ", "missing"),
+        (with("/axes/0/moving_average", json!({"density": "-1 deg/s/√Hz", "samples": 2})), "axes[0].moving_average.density: ", "greater than zero"),
+        (with("/axes/0/moving_average", json!({"density": "1 deg/s", "samples": 2})), "axes[0].moving_average.density: ", "standard deviation of one sample"),
         (line("std_dev", json!("-1 deg/s")), "axes[0].oscillation[0].std_dev: ", "greater than zero"),
         (line("frequency", json!("0 Hz")), "axes[0].oscillation[0].frequency: ", "greater than zero"),
         (line("frequency", json!(20)), "axes[0].oscillation[0].frequency: ", "the number 20 has no unit"),

@@ -19,6 +19,7 @@ const RICH: &str = r#"{
      "bias_instability": {"coefficient": "0.02 deg/s"},
      "gauss_markov": [{"std_dev": "0.03 deg/s", "correlation_time": "10 s"},
                       {"std_dev": "0.01 deg/s", "correlation_time": "200 s"}],
+     "moving_average": {"density": "0.02 deg/s/sqrt(Hz)", "samples": 4},
      "oscillation": {"std_dev": "0.02 deg/s", "frequency": "7 Hz", "correlation_time": "3 s"},
      "rate_random_walk": {"density": "0.001 deg/s/sqrt(s)"},
      "rate_ramp": {"slope": "0.0001 deg/s^2"}},
@@ -79,7 +80,7 @@ mod library {
         let motion = TrueRate::Sinusoid { amplitude: 0.2, frequency_hz: 0.5 };
         let axes = simulate(&params, &Scenario { true_rate: motion, ..scenario(500) }, 64);
         let kinds: Vec<Kind> = params.axes[0].noise().terms.iter().map(|t| t.kind()).collect();
-        assert_eq!(kinds.len(), 8);
+        assert_eq!(kinds.len(), 9);
         let x = &axes[0];
         assert!((x.bias - 2.0 * DEGREE).abs() < 1e-15);
         for k in 0..500 {
@@ -89,7 +90,9 @@ mod library {
                 .terms
                 .iter()
                 .zip(&kinds)
-                .filter(|(_, kind)| !matches!(kind, Kind::White | Kind::Quantization | Kind::Oscillation))
+                .filter(|(_, kind)| {
+                    !matches!(kind, Kind::White | Kind::Quantization | Kind::MovingAverage | Kind::Oscillation)
+                })
                 .map(|(t, _)| t[k])
                 .sum();
             assert!((x.drift[k] - drift).abs() < 1e-15, "sample {k}");
@@ -121,10 +124,10 @@ mod library {
         // the other axis away; terms of other kinds and the later one of the same kind away; a longer run
         let mut fewer = params.clone();
         fewer.axes.truncate(1);
-        fewer.axes[0].terms.remove(5);
+        fewer.axes[0].terms.remove(6);
         fewer.axes[0].terms.remove(0);
         let found = simulate(&fewer, &scenario(900), 100);
-        for (i, j) in [(0, 1), (1, 2), (2, 3), (3, 4), (4, 6), (5, 7)] {
+        for (i, j) in [(0, 1), (1, 2), (2, 3), (3, 4), (4, 5), (5, 7), (6, 8)] {
             assert_eq!(found[0].terms[i][..300], base[0].terms[j], "term {j}");
         }
         // the turn-on draw and the motion have streams of their own or none
@@ -141,7 +144,7 @@ mod library {
         for (seed, run) in [(1, 0), (1, 1), (2, 0)] {
             for axis in simulate(&twin, &Scenario { seed, run, ..scenario(3) }, 3) {
                 // the ramp is the last and draws nothing; the random walk starts at 0: compare the third sample's change
-                for term in &axis.terms[..7] {
+                for term in &axis.terms[..8] {
                     first.push((term[2] - term[1]).to_bits());
                 }
             }
@@ -149,7 +152,7 @@ mod library {
         let count = first.len();
         first.sort_unstable();
         first.dedup();
-        assert_eq!((count, first.len()), (42, 42), "two streams are alike");
+        assert_eq!((count, first.len()), (48, 48), "two streams are alike");
     }
 
     #[test]
@@ -163,6 +166,7 @@ mod library {
             (Kind::RateRandomWalk, 0x5_0000),
             (Kind::RateRamp, 0x6_0000),
             (Kind::Oscillation, 0x7_0000),
+            (Kind::MovingAverage, 0x8_0000),
         ] {
             assert_eq!((term_number(kind, 0), term_number(kind, 3)), (code, code + 3));
         }

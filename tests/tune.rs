@@ -129,14 +129,20 @@ fn the_error_budget_is_that_of_an_independent_implementation() {
 fn the_error_budget_adds_up_to_the_steady_variance() {
     let quantization = TermEntry::Quantization { coefficient: measured(1e-4, "deg") };
     let flicker = TermEntry::BiasInstability { coefficient: measured(10.0, "deg/h") };
+    let average = TermEntry::MovingAverage { density: measured(0.03, "deg/s/sqrt(Hz)"), samples: 5 };
     let line = TermEntry::Oscillation {
         std_dev: measured(0.05, "deg/s"),
         frequency: measured(0.3, "Hz"),
         correlation_time: measured(2.0, "s"),
     };
-    for extra in
-        [vec![], vec![gauss_markov(0.02, 3.0), random_walk(1e-4)], vec![quantization], vec![line], vec![flicker]]
-    {
+    for extra in [
+        vec![],
+        vec![gauss_markov(0.02, 3.0), random_walk(1e-4)],
+        vec![quantization],
+        vec![line],
+        vec![average],
+        vec![flicker],
+    ] {
         let mut terms = vec![white(0.01), gauss_markov(0.03, 200.0)];
         terms.extend(extra);
         let tuned = tuned(&sensor(100.0, terms, Some(0.1)));
@@ -144,7 +150,10 @@ fn the_error_budget_adds_up_to_the_steady_variance() {
         let (model, steady) = (&axis.model, &axis.steady_state);
         let mut d = model.h.clone();
         for (i, state) in model.states.iter().enumerate() {
-            if state.name.starts_with("quantization") || state.name.starts_with("oscillation") {
+            if state.name.starts_with("quantization")
+                || state.name.starts_with("oscillation")
+                || state.name.starts_with("moving")
+            {
                 d[(0, i)] = 0.0;
             }
         }

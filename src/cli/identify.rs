@@ -306,6 +306,9 @@ fn parameter_rows(axis: &Axis, quantity: Quantity) -> Vec<Vec<String>> {
         match term {
             TermEntry::Quantization { coefficient } => rows.push(row("quantization Q", coefficient, String::new())),
             TermEntry::White { density } => rows.push(row("white N", density, random_walk_name(density, quantity))),
+            TermEntry::MovingAverage { density, samples } => {
+                rows.push(row("moving average N", density, format!("over {samples} samples")));
+            }
             TermEntry::Oscillation { std_dev, frequency, correlation_time } => {
                 rows.push(row("oscillation sigma", std_dev, String::new()));
                 rows.push(row("oscillation f0", frequency, String::new()));

@@ -165,7 +165,7 @@ fn usable(name: &str, rate: &[f64]) -> Result<(), IdentifyError> {
 fn coefficient_unit(kind: Kind, display: &Unit) -> Unit {
     display.times_time(match kind {
         Kind::Quantization => 2,
-        Kind::White => 1,
+        Kind::White | Kind::MovingAverage => 1,
         Kind::Oscillation | Kind::BiasInstability | Kind::GaussMarkov => 0,
         Kind::RateRandomWalk => -1,
         Kind::RateRamp => -2,
@@ -184,6 +184,7 @@ fn entry(term: &Term, intervals: &[Option<[f64; 2]>], display: &Unit) -> Result<
     Ok(match *term {
         Term::Quantization { coefficient: q } => TermEntry::Quantization { coefficient: coefficient(q) },
         Term::White { density } => TermEntry::White { density: coefficient(density) },
+        Term::MovingAverage { density, samples } => TermEntry::MovingAverage { density: coefficient(density), samples },
         Term::Oscillation { std_dev, frequency_hz, correlation_time } => TermEntry::Oscillation {
             std_dev: coefficient(std_dev),
             frequency: further(1, frequency_hz, "Hz")?,
@@ -209,7 +210,7 @@ fn bias(rate: &[f64], dt: f64, model: &NoiseModel, display: &Unit) -> Measured {
     let samples = rate.len() as u64;
     let span = rate.len() as f64 * dt;
     let variance = |term: &Term| match *term {
-        Term::White { density } => density * density / span,
+        Term::White { density } | Term::MovingAverage { density, .. } => density * density / span,
         Term::GaussMarkov { std_dev, correlation_time } => {
             let x = correlation_time / span;
             2.0 * std_dev * std_dev * x * (1.0 + x * (-1.0 / x).exp_m1())

@@ -152,7 +152,7 @@ impl Table {
     fn square(&self, term: &Term) -> f64 {
         let coefficient = match *term {
             Term::Quantization { coefficient } | Term::BiasInstability { coefficient } => coefficient,
-            Term::White { density } | Term::RateRandomWalk { density } => density,
+            Term::White { density } | Term::MovingAverage { density, .. } | Term::RateRandomWalk { density } => density,
             Term::GaussMarkov { std_dev, .. } | Term::Oscillation { std_dev, .. } => std_dev,
             Term::RateRamp { slope } => slope,
         };

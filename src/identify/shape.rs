@@ -81,11 +81,13 @@ pub(super) fn roles(kind: Kind) -> &'static [Role] {
     }
 }
 
-/// A term with one coefficient; correlation times are 1 s, frequencies 1 Hz.
+/// A term with one coefficient; correlation times are 1 s, frequencies 1 Hz,
+/// averages over two samples.
 pub(super) fn one_coefficient(kind: Kind, value: f64) -> Term {
     match kind {
         Kind::Quantization => Term::Quantization { coefficient: value },
         Kind::White => Term::White { density: value },
+        Kind::MovingAverage => Term::MovingAverage { density: value, samples: 2 },
         Kind::Oscillation => Term::Oscillation { std_dev: value, frequency_hz: 1.0, correlation_time: 1.0 },
         Kind::BiasInstability => Term::BiasInstability { coefficient: value },
         Kind::GaussMarkov => Term::GaussMarkov { std_dev: value, correlation_time: 1.0 },
@@ -99,6 +101,7 @@ pub(super) fn short_name(kind: Kind) -> &'static str {
     match kind {
         Kind::Quantization => "quantization",
         Kind::White => "white",
+        Kind::MovingAverage => "ma",
         Kind::Oscillation => "osc",
         Kind::BiasInstability => "flicker",
         Kind::GaussMarkov => "gm",
@@ -112,6 +115,7 @@ pub(super) fn document_name(kind: Kind) -> &'static str {
     match kind {
         Kind::Quantization => "quantization",
         Kind::White => "white",
+        Kind::MovingAverage => "moving_average",
         Kind::Oscillation => "oscillation",
         Kind::BiasInstability => "bias_instability",
         Kind::GaussMarkov => "gauss_markov",
@@ -121,9 +125,10 @@ pub(super) fn document_name(kind: Kind) -> &'static str {
 }
 
 /// All kinds, in the fixed order.
-pub(super) const KINDS: [Kind; 7] = [
+pub(super) const KINDS: [Kind; 8] = [
     Kind::Quantization,
     Kind::White,
+    Kind::MovingAverage,
     Kind::Oscillation,
     Kind::BiasInstability,
     Kind::GaussMarkov,
@@ -131,7 +136,7 @@ pub(super) const KINDS: [Kind; 7] = [
     Kind::RateRamp,
 ];
 
-/// The kinds that show in an Allan curve: it averages a narrow line away.
+/// The kinds that show in an Allan curve: it averages a narrow line away, and a moving average is white but for the shortest times.
 pub(super) fn in_allan_curve(kind: Kind) -> bool {
-    kind != Kind::Oscillation
+    !matches!(kind, Kind::MovingAverage | Kind::Oscillation)
 }

@@ -6,6 +6,7 @@
 
 mod bias_instability;
 mod gauss_markov;
+mod moving_average;
 mod oscillation;
 mod quantization;
 mod ramp;
@@ -26,6 +27,7 @@ use crate::units::digits;
 pub enum Kind {
     Quantization,
     White,
+    MovingAverage,
     Oscillation,
     BiasInstability,
     GaussMarkov,
@@ -37,7 +39,7 @@ impl Kind {
     /// Drift of the bias, which a filter estimates and takes off; else noise of the measurement, whatever states it needs.
     pub fn is_drift(self) -> bool {
         match self {
-            Kind::Quantization | Kind::White | Kind::Oscillation => false,
+            Kind::Quantization | Kind::White | Kind::MovingAverage | Kind::Oscillation => false,
             Kind::BiasInstability | Kind::GaussMarkov | Kind::RateRandomWalk | Kind::RateRamp => true,
         }
     }
@@ -46,13 +48,35 @@ impl Kind {
 /// One noise process with SI coefficients.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Term {
-    Quantization { coefficient: f64 },
-    White { density: f64 },
-    Oscillation { std_dev: f64, frequency_hz: f64, correlation_time: f64 },
-    BiasInstability { coefficient: f64 },
-    GaussMarkov { std_dev: f64, correlation_time: f64 },
-    RateRandomWalk { density: f64 },
-    RateRamp { slope: f64 },
+    Quantization {
+        coefficient: f64,
+    },
+    White {
+        density: f64,
+    },
+    /// `samples` ≥ 2.
+    MovingAverage {
+        density: f64,
+        samples: u32,
+    },
+    Oscillation {
+        std_dev: f64,
+        frequency_hz: f64,
+        correlation_time: f64,
+    },
+    BiasInstability {
+        coefficient: f64,
+    },
+    GaussMarkov {
+        std_dev: f64,
+        correlation_time: f64,
+    },
+    RateRandomWalk {
+        density: f64,
+    },
+    RateRamp {
+        slope: f64,
+    },
 }
 
 /// A line that a log of this rate cannot show where it is.
@@ -98,6 +122,7 @@ impl Term {
         match self {
             Term::Quantization { .. } => Kind::Quantization,
             Term::White { .. } => Kind::White,
+            Term::MovingAverage { .. } => Kind::MovingAverage,
             Term::Oscillation { .. } => Kind::Oscillation,
             Term::BiasInstability { .. } => Kind::BiasInstability,
             Term::GaussMarkov { .. } => Kind::GaussMarkov,
@@ -111,6 +136,7 @@ impl Term {
         match *self {
             Term::Quantization { coefficient } => quantization::psd(coefficient, f_hz, dt),
             Term::White { density } => white::psd(density),
+            Term::MovingAverage { density, samples } => moving_average::psd(density, samples, f_hz, dt),
             Term::Oscillation { std_dev, frequency_hz, correlation_time } => {
                 oscillation::psd(std_dev, frequency_hz, correlation_time, f_hz, dt)
             }
@@ -127,6 +153,7 @@ impl Term {
         match *self {
             Term::Quantization { coefficient } => quantization::allan_variance(coefficient, m, dt),
             Term::White { density } => white::allan_variance(density, m, dt),
+            Term::MovingAverage { density, samples } => moving_average::allan_variance(density, samples, m, dt),
             Term::Oscillation { std_dev, frequency_hz, correlation_time } => {
                 oscillation::allan_variance(std_dev, frequency_hz, correlation_time, m, dt)
             }
@@ -144,6 +171,7 @@ impl Term {
         match *self {
             Term::Quantization { coefficient } => Some(quantization::autocovariance(coefficient, lag, dt)),
             Term::White { density } => Some(white::autocovariance(density, lag, dt)),
+            Term::MovingAverage { density, samples } => Some(moving_average::autocovariance(density, samples, lag, dt)),
             Term::Oscillation { std_dev, frequency_hz, correlation_time } => {
                 Some(oscillation::autocovariance(std_dev, frequency_hz, correlation_time, lag, dt))
             }
@@ -167,6 +195,9 @@ impl Term {
         match *self {
             Term::Quantization { coefficient } => quantization::second_difference(coefficient, m1, m2, h),
             Term::White { density } => white::second_difference(density, m1, m2, h, dt),
+            Term::MovingAverage { density, samples } => {
+                moving_average::second_difference(density, samples, m1, m2, h, dt)
+            }
             Term::Oscillation { std_dev, frequency_hz, correlation_time } => {
                 oscillation::second_difference([std_dev, frequency_hz, correlation_time], m1, m2, h, dt)
             }
@@ -185,6 +216,7 @@ impl Term {
         match *self {
             Term::Quantization { coefficient } => Some(quantization::realisation(coefficient, dt)),
             Term::White { .. } => None,
+            Term::MovingAverage { density, samples } => Some(moving_average::realisation(density, samples, dt)),
             Term::Oscillation { std_dev, frequency_hz, correlation_time } => {
                 Some(oscillation::realisation(std_dev, frequency_hz, correlation_time, dt))
             }
@@ -203,6 +235,7 @@ impl Term {
         match *self {
             Term::Quantization { coefficient } => Box::new(quantization::Path::new(coefficient, dt, rng)),
             Term::White { density } => Box::new(white::Path::new(density, dt, rng)),
+            Term::MovingAverage { density, samples } => Box::new(moving_average::Path::new(density, samples, dt, rng)),
             Term::Oscillation { std_dev, frequency_hz, correlation_time } => {
                 Box::new(oscillation::Path::new(std_dev, frequency_hz, correlation_time, dt, rng))
             }
@@ -231,6 +264,14 @@ impl NoiseModel {
     }
     pub fn allan_variance(&self, m: u64, dt: f64) -> f64 {
         self.terms.iter().map(|t| t.allan_variance(m, dt)).sum()
+    }
+    /// Root of the density at low frequencies of all that is white there: white noise and moving averages.
+    pub fn wideband_density(&self) -> f64 {
+        let square = |term: &Term| match *term {
+            Term::White { density } | Term::MovingAverage { density, .. } => density * density,
+            _ => 0.0,
+        };
+        self.terms.iter().map(square).sum::<f64>().sqrt()
     }
     /// Total white density (root of the sum of squares), 0 if there is none.
     pub fn white_density(&self) -> f64 {

@@ -12,8 +12,19 @@ use crate::units::{Dimension, Quantity, Unit};
 
 pub(super) const FORMAT: &str = "kfdesign-params/1";
 
-const TERM_KEYS: [&str; 7] =
-    ["quantization", "white", "oscillation", "bias_instability", "gauss_markov", "rate_random_walk", "rate_ramp"];
+const TERM_KEYS: [&str; 8] = [
+    "quantization",
+    "white",
+    "moving_average",
+    "oscillation",
+    "bias_instability",
+    "gauss_markov",
+    "rate_random_walk",
+    "rate_ramp",
+];
+
+/// A longer average is a filter that a log at a lower rate would show as well; each sample is a state.
+const LONGEST_AVERAGE: u64 = 64;
 
 #[derive(Serialize, JsonSchema)]
 enum Format {
@@ -54,6 +65,9 @@ struct AxisDocument {
     /// Root of the two-sided power spectral density.
     #[serde(skip_serializing_if = "Option::is_none")]
     white: Option<OneOrMany<Density>>,
+    /// White noise that the sensor has averaged over neighbouring samples.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    moving_average: Option<OneOrMany<MovingAverage>>,
     /// Vibration lines.
     #[serde(skip_serializing_if = "Option::is_none")]
     oscillation: Option<OneOrMany<Oscillation>>,
@@ -88,6 +102,15 @@ struct StdDev {
 #[serde(deny_unknown_fields)]
 struct Density {
     density: Measured,
+}
+
+/// Mean of as many independent samples; the density is that at low frequencies.
+#[derive(Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct MovingAverage {
+    density: Measured,
+    #[schemars(range(min = 2, max = 64))]
+    samples: u32,
 }
 
 #[derive(Serialize, JsonSchema)]
@@ -171,12 +194,15 @@ fn list<T>(items: Vec<T>) -> Option<OneOrMany<T>> {
 impl From<&AxisParams> for AxisDocument {
     fn from(axis: &AxisParams) -> Self {
         let (mut quantization, mut white, mut bias_instability) = (Vec::new(), Vec::new(), Vec::new());
-        let mut oscillation = Vec::new();
+        let (mut moving_average, mut oscillation) = (Vec::new(), Vec::new());
         let (mut gauss_markov, mut rate_random_walk, mut rate_ramp) = (Vec::new(), Vec::new(), Vec::new());
         for term in axis.terms.iter().cloned() {
             match term {
                 TermEntry::Quantization { coefficient } => quantization.push(Coefficient { coefficient }),
                 TermEntry::White { density } => white.push(Density { density }),
+                TermEntry::MovingAverage { density, samples } => {
+                    moving_average.push(MovingAverage { density, samples });
+                }
                 TermEntry::Oscillation { std_dev, frequency, correlation_time } => {
                     oscillation.push(Oscillation { std_dev, frequency, correlation_time });
                 }
@@ -194,6 +220,7 @@ impl From<&AxisParams> for AxisDocument {
             turn_on_bias: axis.turn_on_bias.clone().map(|std_dev| StdDev { std_dev }),
             quantization: one_or_many(quantization),
             white: one_or_many(white),
+            moving_average: one_or_many(moving_average),
             oscillation: list(oscillation),
             bias_instability: one_or_many(bias_instability),
             gauss_markov: list(gauss_markov),
@@ -323,6 +350,19 @@ fn term(key: &str, place: &Place<'_>, base: Dimension) -> Result<TermEntry, KeyE
             coefficient: positive(&place.object(&["coefficient"])?, "coefficient", base.times_time(2))?,
         },
         "white" => TermEntry::White { density: positive(&place.object(&["density"])?, "density", base.times_time(1))? },
+        "moving_average" => {
+            let object = place.object(&["density", "samples"])?;
+            let samples = object.required("samples")?;
+            let count = samples.count()?;
+            if !(2..=LONGEST_AVERAGE).contains(&count) {
+                let expected = format!("expected 2 to {LONGEST_AVERAGE}; an average over one sample is 'white'");
+                return Err(samples.error(format!("found {count}, {expected}")));
+            }
+            TermEntry::MovingAverage {
+                density: positive(&object, "density", base.times_time(1))?,
+                samples: count as u32,
+            }
+        }
         "oscillation" => {
             let object = place.object(&["std_dev", "frequency", "correlation_time"])?;
             TermEntry::Oscillation {

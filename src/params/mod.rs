@@ -23,6 +23,7 @@ use place::{KeyError, Place};
 pub enum TermEntry {
     Quantization { coefficient: Measured },
     White { density: Measured },
+    MovingAverage { density: Measured, samples: u32 },
     Oscillation { std_dev: Measured, frequency: Measured, correlation_time: Measured },
     BiasInstability { coefficient: Measured },
     GaussMarkov { std_dev: Measured, correlation_time: Measured },
@@ -112,6 +113,7 @@ impl TermEntry {
         match self {
             TermEntry::Quantization { coefficient } => ("quantization", vec![("coefficient", coefficient)]),
             TermEntry::White { density } => ("white", vec![("density", density)]),
+            TermEntry::MovingAverage { density, .. } => ("moving_average", vec![("density", density)]),
             TermEntry::Oscillation { std_dev, frequency, correlation_time } => {
                 let values = [("std_dev", std_dev), ("frequency", frequency), ("correlation_time", correlation_time)];
                 ("oscillation", values.into())
@@ -130,6 +132,9 @@ impl TermEntry {
         match self {
             TermEntry::Quantization { coefficient } => Term::Quantization { coefficient: coefficient.si() },
             TermEntry::White { density } => Term::White { density: density.si() },
+            TermEntry::MovingAverage { density, samples } => {
+                Term::MovingAverage { density: density.si(), samples: *samples }
+            }
             TermEntry::Oscillation { std_dev, frequency, correlation_time } => Term::Oscillation {
                 std_dev: std_dev.si(),
                 frequency_hz: frequency.si(),

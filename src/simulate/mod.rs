@@ -17,6 +17,7 @@
 //! | rate random walk | 0x5_0000 + i |
 //! | rate ramp (draws nothing) | 0x6_0000 + i |
 //! | oscillation | 0x7_0000 + i |
+//! | moving average | 0x8_0000 + i |
 //!
 //! with i counting the terms of that kind on the axis from 0. Adding an axis, a term of another kind or a later term of
 //! the same kind changes no other number.
@@ -98,6 +99,7 @@ pub fn term_number(kind: Kind, index: u32) -> u32 {
         Kind::RateRamp => 6,
         // later kinds come after the earlier ones, whose numbers stay
         Kind::Oscillation => 7,
+        Kind::MovingAverage => 8,
     };
     (code << 16) + index
 }

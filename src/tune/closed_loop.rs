@@ -41,7 +41,7 @@ fn part(a: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
 fn source(state: &str) -> String {
     match state.split_once('.') {
         _ if state == "bias" => "rate_random_walk".into(),
-        Some((chain @ ("bias_instability" | "quantization" | "rate_ramp"), _)) => chain.into(),
+        Some((chain @ ("bias_instability" | "moving_average" | "quantization" | "rate_ramp"), _)) => chain.into(),
         _ => state.replace(".quadrature", ""),
     }
 }

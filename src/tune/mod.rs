@@ -95,7 +95,7 @@ pub struct Tuned {
 ///
 /// States are the constant bias and those of each process, discretised exactly; R = N²/dt; P0 of the bias is the turn-on bias, that
 /// of a process its stationary variance. A rate random walk has the same dynamics as the constant bias and shares its state;
-/// flicker is a chain of Gauss-Markov states. Lines and quantisation are noise of the measurement: they have states, but are no
+/// flicker is a chain of Gauss-Markov states. Lines, moving averages and quantisation are noise of the measurement: they have states, but are no
 /// part of the drift.
 /// Errors: no white noise, a line not below half the sample rate, or a model without a steady state.
 pub fn tune(params: &Params, options: &TuneOptions) -> Result<Tuned, TuneError> {

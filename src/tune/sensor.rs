@@ -76,10 +76,11 @@ pub(super) fn drift_sigma(model: &LinearModel, p: &DMatrix<f64>) -> f64 {
     (&d * p * d.transpose())[(0, 0)].max(0.0).sqrt()
 }
 
-/// H without quantisation and oscillation, which are noise of the measurement although they need states.
+/// H without quantisation, moving average and oscillation, which are noise of the measurement although they need states.
 pub(super) fn drift_row(model: &LinearModel) -> DMatrix<f64> {
     DMatrix::from_fn(1, model.states.len(), |_, j| {
-        let measured = ["quantization", "oscillation"].iter().any(|kind| model.states[j].name.starts_with(kind));
+        let kinds = ["quantization", "moving_average", "oscillation"];
+        let measured = kinds.iter().any(|kind| model.states[j].name.starts_with(kind));
         if measured { 0.0 } else { model.h[(0, j)] }
     })
 }
@@ -139,6 +140,11 @@ fn together(a: &Term, b: &Term) -> Option<Term> {
         (Term::Quantization { coefficient: x }, Term::Quantization { coefficient: y }) => {
             Some(Term::Quantization { coefficient: x.hypot(y) })
         }
+        (Term::MovingAverage { density: x, samples }, Term::MovingAverage { density: y, samples: other })
+            if samples == other =>
+        {
+            Some(Term::MovingAverage { density: x.hypot(y), samples })
+        }
         (
             Term::Oscillation { std_dev: x, frequency_hz, correlation_time },
             Term::Oscillation { std_dev: y, frequency_hz: other, correlation_time: time },
@@ -158,6 +164,7 @@ fn name(kind: Kind) -> &'static str {
     match kind {
         Kind::Quantization => "quantization",
         Kind::White => "white",
+        Kind::MovingAverage => "moving_average",
         Kind::Oscillation => "oscillation",
         Kind::BiasInstability => "bias_instability",
         Kind::GaussMarkov => "gauss_markov",

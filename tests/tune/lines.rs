@@ -11,9 +11,14 @@ fn line(std_dev: f64, frequency: f64, correlation_time: f64) -> TermEntry {
     }
 }
 
-/// A line of 20 Hz on the reference sensor.
+fn average(density: f64, samples: u32) -> TermEntry {
+    TermEntry::MovingAverage { density: measured(density, "deg/s/sqrt(Hz)"), samples }
+}
+
+/// A line of 20 Hz and an average over two samples beside white noise and a drift.
 fn vibrating() -> Params {
-    sensor(100.0, vec![white(0.05), line(0.3, 20.0, 3.0), gauss_markov(0.03, 20.0)], Some(0.1))
+    let terms = vec![white(0.05), line(0.3, 20.0, 3.0), average(0.05, 2), gauss_markov(0.03, 20.0)];
+    sensor(100.0, terms, Some(0.1))
 }
 
 #[test]
@@ -24,10 +29,11 @@ fn the_states_have_names_and_units_and_are_no_drift() {
     let (model, report) = (&tuned.design.axes[0].model, &tuned.reports[0]);
     let names: Vec<&str> = model.states.iter().map(|s| s.name.as_str()).collect();
     let second = ["oscillation.2", "oscillation.quadrature.2"];
-    assert_eq!(names, [&["bias", "oscillation", "oscillation.quadrature"], &second[..], &["gauss_markov"]].concat());
+    let first = ["bias", "moving_average", "moving_average.2", "oscillation", "oscillation.quadrature"];
+    assert_eq!(names, [&first[..], &second, &["gauss_markov"]].concat());
     assert!(model.states.iter().all(|s| s.unit == "rad/s"));
     let sources: Vec<&str> = report.error_budget.iter().map(|s| s.source.as_str()).collect();
-    assert_eq!(sources, ["white", "oscillation", "oscillation.2", "gauss_markov"]);
+    assert_eq!(sources, ["white", "moving_average", "oscillation", "oscillation.2", "gauss_markov"]);
     close(report.error_budget.iter().map(|s| s.share).sum(), 1.0, 1e-12);
     // a line far above the filter's bandwidth costs the drift estimate next to nothing
     let mut still = vibrating();
@@ -49,8 +55,8 @@ fn lines_merge_and_are_no_drift_on_their_own() {
     assert!(report.error_budget.is_empty() && report.bandwidth_hz.is_none());
 }
 
-/// Autocorrelation of the innovations on a simulated hour: with the line in the filter all of lags 1–50 are within 5.2 standard errors
-/// of zero (2e-7 each, 1e-5 in all) and NIS within 5 of 1 (6e-7); without it lag 5, one period, is not.
+/// Autocorrelation of the innovations on a simulated hour: with line and average in the filter all of lags 1–50 are within 5.2 standard errors
+/// of zero (2e-7 each, 1e-5 in all) and NIS within 5 of 1 (6e-7); without one of them it is not so: of the average lag one shows.
 #[test]
 fn innovations_are_white_with_the_line_in_the_filter() {
     let params = vibrating();
@@ -59,9 +65,11 @@ fn innovations_are_white_with_the_line_in_the_filter() {
     let n = log.len() as f64;
     assert!(worst < 5.2 / n.sqrt(), "largest autocorrelation {worst}");
     assert!((nis - 1.0).abs() < 5.0 * (2.0 / n).sqrt(), "NIS {nis}");
-    let mut without = params;
-    without.axes[0].terms.remove(1);
-    assert!(innovations(&tuned(&without).design, &log).0 > 0.1);
+    for term in [1, 2] {
+        let mut without = params.clone();
+        without.axes[0].terms.remove(term);
+        assert!(innovations(&tuned(&without).design, &log).0 > 0.1);
+    }
 }
 
 /// False alarm 1e-5; the seed was not chosen among several.

@@ -219,9 +219,10 @@ pub(super) fn budget_rows(group: &Group<'_>) -> Vec<Vec<String>> {
     rows
 }
 
-/// States with a column of their own: not those that only together stand for flicker.
+/// States with a column of their own: not those that only together stand for flicker or an average.
 pub(super) fn told(model: &LinearModel) -> impl Iterator<Item = usize> + '_ {
-    (0..model.states.len()).filter(|&i| !model.states[i].name.starts_with("bias_instability"))
+    let together = ["bias_instability", "moving_average"];
+    (0..model.states.len()).filter(move |&i| !together.iter().any(|kind| model.states[i].name.starts_with(kind)))
 }
 
 pub(super) fn sigma_header(group: &Group<'_>) -> Vec<String> {

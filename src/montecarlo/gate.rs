@@ -1,7 +1,7 @@
 //! The tests of the gate, and how many of them make one verdict.
 //!
 //! Every test gives a *raw* p-value from its own formula. Tests that look at many epochs, lengths or frequencies at once take the least, and
-//! the law of that least value for a true filter, drawn in [`super::law`], makes it the p-value of one test: the band is simultaneous. In the same way
+//! the law of that least value for a true filter, drawn in `super::law`, makes it the p-value of one test: the band is simultaneous. In the same way
 //! the least p-value over all tests and axes is held against its own law (Westfall & Young 1993, single step), so that the family-wise
 //! false-alarm probability *is* alpha, not merely bounded by it as with Holm's or Bonferroni's rule: the tests are correlated, and the
 //! law knows how.

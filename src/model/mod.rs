@@ -66,6 +66,14 @@ impl ModelError {
 }
 
 impl LinearModel {
+    /// The first row of H without quantisation, moving averages and oscillations, which are noise of the measurement although they
+    /// need states: times x it is the whole drift, which is subtracted from a measurement.
+    pub fn drift_row(&self) -> DMatrix<f64> {
+        let kinds = ["quantization", "moving_average", "oscillation"];
+        let noise = |j: usize| kinds.iter().any(|kind| self.states[j].name.starts_with(kind));
+        DMatrix::from_fn(1, self.states.len(), |_, j| if noise(j) { 0.0 } else { self.h[(0, j)] })
+    }
+
     /// Checks that names are unique, shapes fit, numbers are finite, Q and P0 are symmetric positive semidefinite and
     /// R is diagonal and positive (measurements are taken one at a time).
     ///

@@ -191,7 +191,7 @@ pub struct AxisResult {
     pub rejected: u64,
     /// Σ −½(ln 2πS + ν²/S) over every accepted sample.
     pub log_likelihood: f64,
-    /// H x at the end of the log: what the filter expects a sensor at rest to show.
+    /// The whole drift at the end of the log: what the filter expects a sensor at rest to show, but for noise of the measurement.
     pub final_output: FinalState,
     pub final_state: Vec<FinalState>,
     /// Absent when too few samples were accepted.
@@ -246,7 +246,7 @@ pub struct ReplayResult {
 struct AxisReplay {
     kalman: Kalman,
     every: u64,
-    h: Vec<f64>,
+    drift: Vec<f64>,
     gate: Option<f64>,
     /// Steps since the first sample.
     step: u64,
@@ -342,7 +342,7 @@ impl AxisReplay {
         AxisReplay {
             kalman: Kalman::new(model),
             every: model.every.first().copied().unwrap_or(1).max(1) as u64,
-            h: model.h.row(0).iter().copied().collect(),
+            drift: model.drift_row().iter().copied().collect(),
             gate,
             step: 0,
             started: false,
@@ -411,14 +411,14 @@ impl AxisReplay {
         self.step = self.step.saturating_add(steps);
     }
 
-    /// H x and √(H P Hᵀ).
+    /// d x and √(d P dᵀ), d the row of the whole drift.
     fn output(&self) -> (f64, f64) {
         let (x, p) = (&self.kalman.x, &self.kalman.p);
         let (mut mean, mut variance) = (0.0, 0.0);
-        for (i, hi) in self.h.iter().enumerate() {
-            mean += hi * x[i];
-            for (j, hj) in self.h.iter().enumerate() {
-                variance += hi * hj * p[(i, j)];
+        for (i, di) in self.drift.iter().enumerate() {
+            mean += di * x[i];
+            for (j, dj) in self.drift.iter().enumerate() {
+                variance += di * dj * p[(i, j)];
             }
         }
         (mean, variance.max(0.0).sqrt())

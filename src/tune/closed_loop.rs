@@ -6,7 +6,6 @@ use nalgebra::{Complex, DMatrix};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::sensor::drift_row;
 use crate::filter::steady_state::SteadyState;
 use crate::model::LinearModel;
 use crate::model::observability::undriven_states;
@@ -28,7 +27,7 @@ pub struct Share {
 fn driven(model: &LinearModel) -> Vec<usize> {
     let undriven = undriven_states(model);
     let driven: Vec<usize> = (0..model.states.len()).filter(|i| !undriven.contains(i)).collect();
-    let drift = drift_row(model);
+    let drift = model.drift_row();
     if driven.iter().any(|&i| drift[(0, i)] != 0.0) { driven } else { Vec::new() }
 }
 
@@ -59,7 +58,7 @@ pub fn error_budget(model: &LinearModel, steady: &SteadyState) -> Result<Vec<Sha
     let all: Vec<usize> = (0..model.h.nrows()).collect();
     let (f, q) = (part(&model.f, &kept, &kept), part(&model.q, &kept, &kept));
     let h = part(&model.h, &all, &kept);
-    let d = part(&drift_row(model), &[0], &kept);
+    let d = part(&model.drift_row(), &[0], &kept);
     let k = part(&steady.gain, &kept, &all);
     let keep = DMatrix::identity(kept.len(), kept.len()) - &k * &h;
     let a = &keep * &f;
@@ -94,7 +93,7 @@ pub fn bandwidth_hz(model: &LinearModel, steady: &SteadyState) -> Option<f64> {
     let kept = driven(model);
     let all: Vec<usize> = (0..model.h.nrows()).collect();
     let h = part(&model.h, &all, &kept);
-    let d = part(&drift_row(model), &[0], &kept);
+    let d = part(&model.drift_row(), &[0], &kept);
     let k = part(&steady.gain, &kept, &all);
     if kept.is_empty() {
         return None;

@@ -72,17 +72,8 @@ pub(super) fn build(
 
 /// Standard deviation of the whole drift, the sum that is subtracted from a measurement, under covariance `p`.
 pub(super) fn drift_sigma(model: &LinearModel, p: &DMatrix<f64>) -> f64 {
-    let d = drift_row(model);
+    let d = model.drift_row();
     (&d * p * d.transpose())[(0, 0)].max(0.0).sqrt()
-}
-
-/// H without quantisation, moving average and oscillation, which are noise of the measurement although they need states.
-pub(super) fn drift_row(model: &LinearModel) -> DMatrix<f64> {
-    DMatrix::from_fn(1, model.states.len(), |_, j| {
-        let kinds = ["quantization", "moving_average", "oscillation"];
-        let measured = kinds.iter().any(|kind| model.states[j].name.starts_with(kind));
-        if measured { 0.0 } else { model.h[(0, j)] }
-    })
 }
 
 /// What the measurements can tell, without a sentence for each state that only stands for flicker together with others.

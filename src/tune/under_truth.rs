@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::sensor::{self, drift_row};
+use super::sensor;
 use super::{TuneError, TuneOptions, Tuned};
 use crate::filter::AxisDesign;
 use crate::filter::gains::GainSequence;
@@ -161,7 +161,7 @@ fn shown_steps(last: u64) -> Vec<u64> {
 fn judge(filter: &LinearModel, truth: &LinearModel, same_states: bool) -> Judge {
     let states = if same_states { filter.states.len() } else { 0 };
     let stack = |model: &LinearModel| {
-        let drift = drift_row(model);
+        let drift = model.drift_row();
         let row = |i: usize, j: usize| if i < states { f64::from(i == j) } else { drift[(0, j)] };
         DMatrix::from_fn(states + 1, model.states.len(), row)
     };

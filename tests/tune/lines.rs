@@ -32,6 +32,7 @@ fn the_states_have_names_and_units_and_are_no_drift() {
     let first = ["bias", "moving_average", "moving_average.2", "oscillation", "oscillation.quadrature"];
     assert_eq!(names, [&first[..], &second, &["gauss_markov"]].concat());
     assert!(model.states.iter().all(|s| s.unit == "rad/s"));
+    assert_eq!(model.drift_row().as_slice(), [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
     let sources: Vec<&str> = report.error_budget.iter().map(|s| s.source.as_str()).collect();
     assert_eq!(sources, ["white", "moving_average", "oscillation", "oscillation.2", "gauss_markov"]);
     close(report.error_budget.iter().map(|s| s.share).sum(), 1.0, 1e-12);

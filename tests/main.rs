@@ -16,6 +16,7 @@ mod identify;
 mod input;
 mod measured;
 mod model;
+mod montecarlo;
 mod noise;
 mod numerics;
 mod params;

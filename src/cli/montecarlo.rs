@@ -18,7 +18,8 @@ use super::output::{digits, print_text, progress};
 use crate::consistency::Verdict;
 use crate::export::{atomic, junit, table::TableWriter};
 use crate::filter::FilterDesign;
-use crate::montecarlo::calibration::{self, REPLICATES};
+use crate::montecarlo::calibration::{self, MAX_REPLICATES, MAX_RUN, REPLICATES};
+use crate::montecarlo::course::{MAX_STEPS, MIN_STEPS};
 use crate::montecarlo::document::{self, Shard};
 use crate::montecarlo::gate::Gate;
 use crate::montecarlo::power::{self, Mistuning};
@@ -28,6 +29,8 @@ use crate::units::Dimension;
 
 /// Time between two writes of unfinished work.
 const CHECKPOINT: Duration = Duration::from_secs(20);
+/// More threads than any machine has processors are a slip of the hand.
+const MAX_THREADS: usize = 1024;
 
 /// Many simulated runs through filter.json: does its covariance tell the truth?
 ///
@@ -119,9 +122,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let truth = args.truth.as_deref().map(Params::read).transpose()?;
     let duration_s = with_unit("--duration", &args.duration, Dimension::TIME, "600s")?;
     let steps = (duration_s * design.sample_rate_hz).round();
-    if steps < 1.0 {
+    if !(MIN_STEPS as f64..=MAX_STEPS as f64).contains(&steps) {
         let rate = design.sample_rate_hz;
-        bail!("--duration {}: not one sample at {rate} Hz; expected a positive time, for example 600s", args.duration);
+        let [least, most] = [MIN_STEPS, MAX_STEPS].map(|steps| digits(steps as f64 / rate));
+        bail!(
+            "--duration {}: expected {least} s to {most} s ({MIN_STEPS} to {MAX_STEPS} samples at {rate} Hz)",
+            args.duration
+        );
     }
     let experiment = Experiment {
         design,
@@ -132,9 +139,15 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         alpha: args.alpha,
         replicates: args.replicates,
     };
+    if !(experiment.alpha > 0.0 && experiment.alpha < 1.0) {
+        bail!("--alpha {}: expected a probability between 0 and 1, for example 0.01", args.alpha);
+    }
     let threads = args.threads.unwrap_or(0);
-    if args.threads == Some(0) {
-        bail!("--threads 0: expected at least 1");
+    if args.threads.is_some_and(|threads| !(1..=MAX_THREADS).contains(&threads)) {
+        bail!("--threads {threads}: expected 1 to {MAX_THREADS}");
+    }
+    if let Some(number) = args.run.filter(|number| *number >= MAX_RUN) {
+        bail!("--run {number}: expected a number below {MAX_RUN}");
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().context("--threads")?;
     pool.install(|| {
@@ -154,6 +167,7 @@ fn range(text: &str) -> anyhow::Result<Range<u64>> {
         Some((first, end)) => number(first).zip(number(end)).map(|(first, end)| first..end),
     };
     match range {
+        Some(range) if range.end > MAX_RUN => bail!("--runs {text}: expected run numbers up to {MAX_RUN}"),
         Some(range) if range.start < range.end => Ok(range),
         _ => bail!("--runs {text}: expected a number of runs of at least 1, or a range like 500..1000"),
     }
@@ -229,7 +243,7 @@ fn many_runs(args: &Args, experiment: &Experiment, course: &Course) -> anyhow::R
         }
     }
     // the runs are kept while they are judged, which can take longer than they did
-    if let Some(path) = &args.outputs.output {
+    if let Some(path) = args.outputs.output.as_ref().filter(|path| is_ordinary(path)) {
         atomic::write(path, partial(&totals, end).as_bytes())?;
     }
     stop.store(true, Ordering::Relaxed);
@@ -255,6 +269,11 @@ pub(super) fn merge(args: &MergeArgs) -> anyhow::Result<Status> {
     let names: Vec<&str> = shards.iter().map(|shard| shard.path.as_str()).collect();
     let sources = [("merged from".to_string(), names.join(", "))];
     args.outputs.finish(&experiment, &course, &totals, runs, &sources)
+}
+
+/// Whether a file is or will be at this place that can be written again: no device, no pipe.
+fn is_ordinary(path: &Path) -> bool {
+    path.is_file() || !path.exists()
 }
 
 /// One run alone, as a table.
@@ -302,11 +321,20 @@ fn one_run(args: &Args, experiment: &Experiment, course: &Course, number: u64) -
 }
 
 impl Outputs {
-    /// No output is an input.
+    /// No output is an input or another output.
     fn check(&self, inputs: &[&Path]) -> anyhow::Result<()> {
-        for output in [&self.output, &self.junit, &self.report].into_iter().flatten() {
+        if self.confirm > MAX_REPLICATES {
+            bail!("--confirm {}: expected at most {MAX_REPLICATES} experiments", self.confirm);
+        }
+        let outputs: Vec<&PathBuf> = [&self.output, &self.junit, &self.report].into_iter().flatten().collect();
+        for (i, output) in outputs.iter().enumerate() {
             for input in inputs {
                 atomic::check_output(output, input)?;
+            }
+            let same = |other: &&PathBuf| std::path::absolute(other).ok() == std::path::absolute(output).ok();
+            // a device, such as /dev/null, may take several
+            if is_ordinary(output) && outputs[..i].iter().any(same) {
+                bail!("{}: cannot write: it is the name of two outputs; give each its own", output.display());
             }
         }
         Ok(())
@@ -336,7 +364,7 @@ impl Outputs {
         outcome.false_alarm_rate = Some(match experiment.replicates {
             0 => calibration::false_alarms(course, &gate, count),
             replicates => {
-                let bar = progress(replicates * count * course.axes.len() as u64, "false alarms");
+                let bar = progress((replicates * count).saturating_mul(course.axes.len() as u64), "false alarms");
                 let own = experiment.own_course()?;
                 let rate = calibration::false_alarms_of_experiments(&own, &gate, count, replicates, &|n| bar.inc(n));
                 bar.finish_and_clear();
@@ -346,7 +374,7 @@ impl Outputs {
         if experiment.truth.is_some() && !experiment.truth_spread {
             outcome.rejection = power::rejection(course, &gate, count);
             if let Some(rejection) = outcome.rejection.as_mut().filter(|_| self.confirm > 0) {
-                let bar = progress(self.confirm * count * course.axes.len() as u64, "confirm");
+                let bar = progress((self.confirm * count).saturating_mul(course.axes.len() as u64), "confirm");
                 let caught =
                     calibration::caught_of_experiments(course, &gate.axes, gate.critical, count, self.confirm, &|n| {
                         bar.inc(n)
@@ -408,7 +436,7 @@ impl Outputs {
         if self.confirm > 0 {
             let sizes: usize =
                 outcome.detects.iter().map(|d| d.too_large.iter().count() + d.too_small.iter().count()).sum();
-            let bar = progress(sizes as u64 * self.confirm * runs, "confirm");
+            let bar = progress((self.confirm * runs).saturating_mul(sizes as u64), "confirm");
             power::confirm(experiment, course, gate, runs, self.confirm, &mut outcome.detects, &|n| bar.inc(n))?;
             bar.finish_and_clear();
         }

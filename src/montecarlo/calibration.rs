@@ -14,8 +14,10 @@ use crate::numerics::distribution::normal_quantile;
 pub const REPLICATES: u64 = 50_000;
 /// Further replicates that measure the false-alarm probability.
 const MEASURED: u64 = 20_000;
-/// First run number of the whole experiments that measure the false-alarm probability; they never share numbers with the experiment itself.
-const FIRST_RUN: u64 = 1 << 40;
+/// Run numbers are below this; from here on they belong to the whole experiments that measure the false-alarm probability.
+pub const MAX_RUN: u64 = 1 << 40;
+/// Most whole experiments that can be asked for: their run numbers stay below 2⁶⁰.
+pub const MAX_REPLICATES: u64 = 1_000_000;
 
 /// How often the gate rejects a true filter.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -96,7 +98,7 @@ pub fn false_alarms_of_experiments(
     progress: &(dyn Fn(u64) + Sync),
 ) -> FalseAlarmRate {
     let raw = |replicate: u64| {
-        let first = FIRST_RUN + replicate * runs.next_multiple_of(4);
+        let first = MAX_RUN + replicate * runs.next_multiple_of(4);
         let totals = own.sums(first..first + runs, progress);
         own.axes.iter().zip(&totals).map(|(axis, totals)| conclusion::raw_p_values(axis, totals, runs)).collect()
     };
@@ -121,7 +123,7 @@ pub fn caught_of_experiments(
     progress: &(dyn Fn(u64) + Sync),
 ) -> Caught {
     let failed = |experiment: &u64| {
-        let first = FIRST_RUN + experiment * runs.next_multiple_of(4);
+        let first = MAX_RUN + experiment * runs.next_multiple_of(4);
         let totals = course.sums(first..first + runs, progress);
         let mut axes = course.axes.iter().zip(&totals).zip(gates);
         axes.any(|((axis, totals), gate)| {
@@ -146,7 +148,8 @@ fn rate(
         let mut failed = false;
         for ((axis, raw), alone) in gate.axes.iter().zip(raw(replicate)).zip(&mut alone) {
             for (p, count) in axis.p_values(&raw).into_iter().zip(alone) {
-                let rejected = p <= gate.critical;
+                // a p-value that is not a number is no pass
+                let rejected = p.is_nan() || p <= gate.critical;
                 failed |= rejected;
                 count[0] += u64::from(p <= gate.alpha);
                 count[1] += u64::from(rejected);

@@ -28,6 +28,8 @@ const LONGEST_BLOCK: f64 = 16.0;
 pub const MAX_STEPS: u64 = 10_000_000;
 /// Fewer steps leave no room for blocks and epochs.
 pub const MIN_STEPS: u64 = 64;
+/// Fewer updates of a measurement in a run have no autocorrelation.
+const MIN_UPDATES: u64 = 2;
 
 /// One axis of an experiment.
 #[derive(Clone, Debug)]
@@ -143,6 +145,12 @@ impl AxisCourse {
             .iter()
             .filter_map(|epoch| EpochCourse::new(&judge, epoch, epoch.step >= regular_from))
             .collect();
+        for (measurement, every) in filter.measurements.iter().zip(&gains.every) {
+            if steps.div_ceil(*every) < MIN_UPDATES {
+                let (axis, name) = (design.name.clone(), measurement.name.clone());
+                return Err(MonteCarloError::Updates { axis, name, every: *every, steps });
+            }
+        }
         let constants = time_constants(&design.steady_state.poles);
         let channels: Vec<Channel> = filter
             .measurements

@@ -16,7 +16,8 @@ const DIRECTIONS: usize = 1024;
 /// FUSION). ε* ~ χ²(n), so E log₁₀ ε* = (ψ(n/2) + ln 2)/ln 10; with u = P^-½ e, ε/ε* = vᵀS v for a uniform direction v and S = E[u uᵀ], which is
 /// averaged over 1024 fixed directions (one component needs none).
 pub(super) fn credibility(mean_log: f64, moments: &[Vec<f64>], size: usize, independent: f64) -> Option<Credibility> {
-    if moments.is_empty() || !mean_log.is_finite() {
+    // an eigenvalue search would not end on what is not finite
+    if moments.is_empty() || !mean_log.is_finite() || moments.iter().flatten().any(|m| !m.is_finite()) {
         return None;
     }
     let half = size as f64 / 2.0;

@@ -6,8 +6,11 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
+use super::calibration::MAX_RUN;
+use super::course::AxisCourse;
 use super::engine::Course;
 use super::outcome::{Outcome, Runs};
+use super::sums::NIS_BINS;
 use super::{Experiment, MonteCarloError, Totals};
 use crate::consistency::Verdict;
 use crate::filter::rows;
@@ -41,6 +44,8 @@ struct AxisSums {
     axis: String,
     /// Each sum as the doubles that add up to it exactly. Per time of the NEES curve: log₁₀ NEES, u, u uᵀ (lower triangle by rows) with u the
     /// whitened error; then per measurement Σy, Σy², Σ y_k y_(k−h), Σ (block sum)²/length, periodogram.
+    /// Null stands for a sum that is not finite.
+    #[schemars(with = "Vec<Vec<Option<f64>>>")]
     values: Vec<Vec<f64>>,
     /// Per time and component: runs within 1, 2, 3 sigma; then per measurement the NIS histogram.
     counts: Vec<u64>,
@@ -124,8 +129,12 @@ impl Shard {
         let experiment = Experiment::from_value(experiment, path)?;
         let run = |key: &str| value.get("runs").and_then(|runs| runs.get(key)).and_then(Value::as_u64);
         let runs = match (run("first"), run("end")) {
-            (Some(first), Some(end)) if first <= end => Runs { first, end },
-            _ => return Err(wrong("runs", "expected {\"first\": A, \"end\": B} with A at most B".into())),
+            (Some(first), Some(end)) if first < end && end <= MAX_RUN => Runs { first, end },
+            _ => {
+                let found = value.get("runs").unwrap_or(&Value::Null);
+                let expected = format!("{{\"first\": A, \"end\": B}} with A below B and B at most {MAX_RUN}");
+                return Err(wrong("runs", format!("found {found}, expected {expected}")));
+            }
         };
         let sums = value.get("sums").and_then(Value::as_array).ok_or_else(|| wrong("sums", "is missing".into()))?;
         let axis = |(i, sums): (usize, &Value)| {
@@ -160,7 +169,7 @@ impl Shard {
         if self.sums.len() != course.axes.len() {
             return Err(wrong(format!("found {} axes, expected {}", self.sums.len(), course.axes.len())));
         }
-        let one = |((values, counts), axis): (&(Vec<Vec<f64>>, Vec<u64>), &super::course::AxisCourse)| {
+        let one = |((values, counts), axis): (&(Vec<Vec<f64>>, Vec<u64>), &AxisCourse)| {
             let fresh = Totals::new(axis.layout());
             if values.len() != fresh.values.len() || counts.len() != fresh.counts.len() {
                 return Err(wrong(format!(
@@ -172,7 +181,12 @@ impl Shard {
                     fresh.counts.len()
                 )));
             }
-            Ok(Totals { values: values.iter().map(|d| ExactSum::from_digits(d)).collect(), counts: counts.clone() })
+            let sums = values.iter().map(|d| ExactSum::from_digits(d)).collect();
+            let totals = Totals { values: sums, counts: counts.clone() };
+            match impossible(&totals, axis, self.runs.count()) {
+                None => Ok(totals),
+                Some(what) => Err(wrong(format!("axis '{}': {what}; the file was changed or damaged", axis.name))),
+            }
         };
         self.sums.iter().zip(&course.axes).map(one).collect()
     }
@@ -189,6 +203,45 @@ impl Shard {
             }),
         }
     }
+}
+
+/// What no `runs` runs can add up to, whatever the truth: counts that do not belong to so many runs, or sums against Cauchy and Schwarz.
+///
+/// Sums that are not finite are those of a truth that runs away; nothing is said about them.
+fn impossible(totals: &Totals, axis: &AxisCourse, runs: u64) -> Option<String> {
+    let layout = axis.layout();
+    // sums of a run are rounded before they are added up
+    let larger = |a: f64, b: f64| a > b + 1e-9 * b.abs();
+    for epoch in 0..axis.epochs.len() {
+        let (means, moments) = (layout.mean(epoch), layout.moments(epoch));
+        for i in 0..axis.judge.size() {
+            let within = &totals.counts[layout.within(epoch, i)..][..3];
+            if !within.is_sorted() || within[2] > runs {
+                return Some(format!("found {within:?} runs within 1, 2, 3 sigma, expected a growing share of {runs}"));
+            }
+            let (mean, square) = (totals.value(means + i), totals.value(moments + i * (i + 3) / 2));
+            if larger(mean * mean, square * runs as f64) {
+                return Some(format!("a sum of errors of {mean} with a sum of squares of {square}"));
+            }
+        }
+    }
+    for (c, channel) in axis.channels.iter().enumerate() {
+        let updates = u128::from(channel.updates) * u128::from(runs);
+        let binned: u128 = totals.counts[layout.histogram(c)..][..=NIS_BINS].iter().map(|n| u128::from(*n)).sum();
+        if binned != updates {
+            return Some(format!("found {binned} innovations in the histogram, expected {updates}"));
+        }
+        let (mean, square) = (totals.value(layout.sum(c)), totals.value(layout.squares(c)));
+        let products = totals.some(layout.lags(c), channel.lags);
+        if larger(mean * mean, square * updates as f64) || products.iter().any(|p| larger(p.abs(), square)) {
+            return Some(format!("a sum of squared innovations of {square} with larger sums of products"));
+        }
+        let powers = totals.some(layout.blocks(c), channel.lengths.len() + channel.ordinates);
+        if let Some(power) = powers.iter().find(|power| **power < 0.0) {
+            return Some(format!("a sum of squares of {power}"));
+        }
+    }
+    None
 }
 
 /// Key and values of the first difference.

@@ -26,23 +26,15 @@ impl Course {
     /// Every random number is addressed by (seed, run, axis, source) and the sums are exact: any number of threads, any cut into ranges
     /// gives the same.
     pub fn sums(&self, runs: Range<u64>, progress: &(dyn Fn(u64) + Sync)) -> Vec<Totals> {
-        let groups: Vec<u64> = runs.clone().step_by(LANES).collect();
-        let items: Vec<(u32, u64)> =
-            (0..).zip(&self.axes).flat_map(|(axis, _)| groups.iter().map(move |first| (axis, *first))).collect();
+        let groups = (runs.end - runs.start).div_ceil(LANES as u64);
         let zero = || self.axes.iter().map(|axis| Totals::new(&axis.layout)).collect::<Vec<_>>();
-        items
-            .par_iter()
+        (0..groups * self.axes.len() as u64)
+            .into_par_iter()
             .fold(
                 || (zero(), self.axes.iter().map(|_| None).collect::<Vec<Option<Scratch>>>()),
-                |(mut totals, mut scratch), &(number, first)| {
-                    self.group(
-                        number,
-                        first,
-                        &runs,
-                        &mut totals[number as usize],
-                        &mut scratch[number as usize],
-                        progress,
-                    );
+                |(mut totals, mut scratch), item| {
+                    let (axis, first) = ((item / groups) as usize, runs.start + item % groups * LANES as u64);
+                    self.group(axis as u32, first, &runs, &mut totals[axis], &mut scratch[axis], progress);
                     (totals, scratch)
                 },
             )

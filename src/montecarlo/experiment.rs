@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use super::MonteCarloError;
+use super::calibration::MAX_REPLICATES;
 use super::course::{AxisCourse, MAX_STEPS, MIN_STEPS, model_of, own_models};
 use super::engine::Course;
 use super::spread::Spread;
@@ -29,6 +30,10 @@ impl Experiment {
     /// Checks and prepares everything that does not depend on the random numbers.
     pub fn course(&self) -> Result<Course, MonteCarloError> {
         check(self.steps, self.alpha)?;
+        if self.replicates > MAX_REPLICATES {
+            let (value, expected) = (self.replicates as f64, format!("at most {MAX_REPLICATES}"));
+            return Err(MonteCarloError::Plan { name: "replicates", value, expected });
+        }
         let settling = self
             .design
             .axes

@@ -67,6 +67,11 @@ pub enum MonteCarloError {
          make the duration longer"
     )]
     Settling { axis: String, duration_s: f64, settling_s: f64 },
+    #[error(
+        "axis '{axis}': measurement '{name}' is taken every {every} samples, but a run has {steps}; expected two in a run: make the duration \
+         longer"
+    )]
+    Updates { axis: String, name: String, every: u64, steps: u64 },
     #[error("axis '{axis}': {what} of the truth: {source}")]
     Truth { axis: String, what: &'static str, source: LinalgError },
     #[error("the truth: {source}")]

@@ -34,6 +34,8 @@ pub struct Outcome {
     pub duration_s: f64,
     pub seed: u64,
     /// A test fails when its p-value is at or below this; set so that a true filter fails some test with probability alpha.
+    /// Null in a document of interrupted work.
+    #[schemars(with = "Option<f64>")]
     pub critical_p_value: f64,
     /// Measured; absent where it was not asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -148,6 +150,7 @@ pub struct Periodogram {
     pub frequency_hz: Vec<f64>,
     pub share: Vec<f64>,
     /// Half width of the band around the straight line; null where there are too few blocks.
+    #[schemars(with = "Option<f64>")]
     pub half_width: f64,
 }
 

@@ -1,7 +1,9 @@
 //! `kfdesign montecarlo` and `kfdesign merge`: the same document however its runs were come by, refusals, truths, closed forms.
 
+mod closed_forms;
 mod refused;
 mod shards;
+mod truths;
 
 use serde_json::Value;
 

@@ -244,7 +244,7 @@ fn the_schema_names_what_the_reader_names() {
 }
 
 /// The part of JSON Schema that our schema uses; anything else in it fails the test.
-fn accepts(schema: &Value, root: &Value, value: &Value) -> Result<(), String> {
+pub fn accepts(schema: &Value, root: &Value, value: &Value) -> Result<(), String> {
     if let Some(reference) = schema.get("$ref").and_then(Value::as_str) {
         return accepts(root.pointer(reference.trim_start_matches('#')).ok_or("dangling reference")?, root, value);
     }

@@ -17,11 +17,14 @@ pub(super) struct Summary<'a> {
     pub(super) axis: &'a AxisCourse,
     pub(super) totals: &'a Totals,
     pub(super) raw: Raw<'a>,
+    /// Some sum is not a number.
+    broken: bool,
 }
 
 impl<'a> Summary<'a> {
     pub(super) fn new(axis: &'a AxisCourse, totals: &'a Totals, runs: u64) -> Summary<'a> {
-        Summary { axis, totals, raw: Raw::new(axis, runs) }
+        let broken = totals.values.iter().any(|sum| sum.value().is_nan());
+        Summary { axis, totals, raw: Raw::new(axis, runs), broken }
     }
 
     fn runs(&self) -> f64 {
@@ -84,7 +87,11 @@ impl<'a> Summary<'a> {
         self.totals.some(self.axis.layout.ordinates(channel), self.axis.channels[channel].ordinates)
     }
 
+    /// Not a number, which is no pass, when some sum is none: least and largest values would step over it.
     fn raw_p(&self, kind: Kind) -> f64 {
+        if self.broken {
+            return f64::NAN;
+        }
         match kind {
             Kind::Nees => self.raw.nees(&self.all_nees()),
             Kind::NeesAverage => self.raw.nees_average(self.nees_over_time().0),

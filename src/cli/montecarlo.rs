@@ -11,6 +11,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
 
 use super::Status;
 use super::flags::with_unit;
@@ -64,7 +66,7 @@ pub struct Args {
     #[arg(long, default_value_t = 0, value_name = "N")]
     replicates: u64,
     /// Simulate this run alone; -o takes its numbers (.csv, .csv.gz or .npy)
-    #[arg(long, value_name = "NUMBER", conflicts_with_all = ["runs", "resume", "json", "junit", "report"])]
+    #[arg(long, value_name = "NUMBER", conflicts_with_all = ["runs", "resume", "replicates", "json", "junit", "report", "power", "plan", "confirm"])]
     run: Option<u64>,
     /// Go on from what -o FILE holds of the same experiment
     #[arg(long, requires = "output")]
@@ -196,15 +198,12 @@ fn many_runs(args: &Args, experiment: &Experiment, course: &Course) -> anyhow::R
         }
     };
     let stop = Arc::new(AtomicBool::new(false));
-    let asked = Arc::clone(&stop);
     // the runs end at their next checkpoint; a second request, or one while they are judged, ends at once
-    let handler = move || {
-        if asked.swap(true, Ordering::Relaxed) {
-            eprintln!("kfdesign: interrupted");
-            std::process::exit(2);
-        }
-    };
-    ctrlc::set_handler(handler).context("cannot watch for Ctrl-C")?;
+    for signal in [SIGINT, SIGTERM] {
+        flag::register_conditional_shutdown(signal, 2, Arc::clone(&stop))
+            .and_then(|_| flag::register(signal, Arc::clone(&stop)))
+            .context("cannot watch for Ctrl-C")?;
+    }
     let axes = course.axes.len() as u64;
     let bar = progress((runs.end - runs.start) * axes, "runs");
     bar.set_position((next - runs.start) * axes);

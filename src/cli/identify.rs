@@ -1,6 +1,7 @@
 //! `kfdesign identify`.
 
 mod sight;
+mod tables;
 
 use std::path::{Path, PathBuf};
 
@@ -16,10 +17,10 @@ use super::output::{digits, print_json, print_text, progress, table};
 use super::stretch::{Stretch, stretches};
 use crate::export::atomic;
 use crate::identify::graphical::Step;
-use crate::identify::{Candidate, Identified, Method, ModelChoice, identify_axis, parse_model};
-use crate::params::{Measured, NotIdentified, Params, Source, TermEntry};
+use crate::identify::{Candidate, Identified, Method, ModelChoice, Precision, identify_axis, parse_model};
+use crate::params::{NotIdentified, Params, Source};
 use crate::signal::LogCheck;
-use crate::units::{Quantity, Unit};
+use crate::units::Quantity;
 
 /// Noise parameters from a log at rest, with intervals
 ///
@@ -38,7 +39,8 @@ pub struct Args {
     /// How parameters are taken from the log
     #[arg(long, value_enum, default_value_t = MethodArg::Allan)]
     method: MethodArg,
-    /// Terms of the model: auto, or white+gm, white+rrw … (terms: white, gm (up to three), rrw, flicker, quantization, ramp)
+    /// Terms of the model: auto, or white+gm, white+rrw … (terms: white, gm (up to three), rrw, flicker, quantization, ramp; for likelihood
+    /// also osc and ma)
     #[arg(long, value_name = "MODEL", default_value = "auto")]
     model: String,
     /// One HTML page with tables and figures
@@ -60,6 +62,8 @@ enum MethodArg {
     Graphical,
     /// Weighted fit of the whole Allan curve, terms chosen by score
     Allan,
+    /// Maximum likelihood of the whole log, terms chosen by score, with the Cramér-Rao bound
+    Likelihood,
 }
 
 impl MethodArg {
@@ -67,6 +71,7 @@ impl MethodArg {
         match self {
             MethodArg::Graphical => Method::Graphical,
             MethodArg::Allan => Method::Allan,
+            MethodArg::Likelihood => Method::Likelihood,
         }
     }
 }
@@ -89,11 +94,15 @@ struct AxisDocument<'a> {
     /// Samples used: the longest stretch without gaps and unusable samples.
     samples: usize,
     left_out: usize,
-    /// Averaging times the fit used, s.
-    first_tau_s: f64,
+    /// Shortest averaging time that an Allan fit used, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    first_tau_s: Option<f64>,
     /// Absent for the graphical recipe.
     fit_p_value: Option<f64>,
     candidates: &'a [Candidate],
+    /// Likelihood only.
+    #[serde(skip_serializing_if = "<[Precision]>::is_empty")]
+    precision: &'a [Precision],
     steps: &'a [Step],
     warnings: &'a [String],
     allan: CurveDocument,
@@ -228,6 +237,7 @@ fn document<'a>(params: &'a Params, axes: &'a [Axis], log: &'a LogCheck) -> Docu
         first_tau_s: a.found.first_tau_s,
         fit_p_value: a.found.fit_p_value.is_finite().then_some(a.found.fit_p_value),
         candidates: &a.found.candidates,
+        precision: &a.found.precision,
         steps: &a.found.steps,
         warnings: &a.found.warnings,
         allan: axis(a),
@@ -235,17 +245,14 @@ fn document<'a>(params: &'a Params, axes: &'a [Axis], log: &'a LogCheck) -> Docu
     Document { format: "kfdesign-identify/1", params, axes: axes.collect(), log }
 }
 
-const PARAMETERS: [&str; 6] = ["parameter", "value", "95 % from", "to", "unit", "also"];
-const CANDIDATES: [&str; 6] = ["model", "parameters", "chi-square", "dof", "score", ""];
 const STEPS: [&str; 4] = ["step", "formula", "value", "unit"];
-/// Candidates shown; all are in the JSON document.
-const SHOWN_CANDIDATES: usize = 6;
 
 /// Everything a person wants to see of one axis.
 fn text(axis: &Axis, quantity: Quantity) -> String {
-    let mut out = format!("{}\n{}", headline(axis), table(&PARAMETERS, &parameter_rows(axis, quantity)));
-    if !axis.found.candidates.is_empty() {
-        out += &format!("\n{CANDIDATES_CAPTION}:\n{}", table(&CANDIDATES, &candidate_rows(&axis.found.candidates)));
+    let parameters = tables::parameters(axis, quantity);
+    let mut out = format!("{}\n{}", headline(axis), table(parameters.header, &parameters.rows));
+    if let Some(candidates) = tables::candidates(&axis.found.candidates) {
+        out += &format!("\n{}:\n{}", candidates.caption, table(candidates.header, &candidates.rows));
     }
     if !axis.found.steps.is_empty() {
         out += &format!("\nThe recipe, step by step:\n{}", table(&STEPS, &step_rows(&axis.found.steps)));
@@ -266,21 +273,20 @@ fn text(axis: &Axis, quantity: Quantity) -> String {
     out
 }
 
-const CANDIDATES_CAPTION: &str = "Candidates (score = chi-square + 4 per parameter + 4 per process; lowest wins)";
-
 /// "gyro_x: white+gm, 720000 samples in 2 h".
 fn headline(axis: &Axis) -> String {
     let Axis { measured, found } = axis;
     let samples = measured.stretch.rate.len();
     let span = duration(samples as f64 * found.curve.dt);
     match found.candidates.iter().find(|c| c.chosen) {
-        Some(chosen) => format!(
-            "{}: {} from {samples} samples ({span}); fit p = {}, averaging times from {} s",
-            found.params.name,
-            chosen.model,
-            digits(found.fit_p_value),
-            digits(found.first_tau_s)
-        ),
+        Some(chosen) => {
+            let used = match found.first_tau_s {
+                Some(tau) => format!(", averaging times from {} s", digits(tau)),
+                None => String::new(),
+            };
+            let (name, p) = (&found.params.name, digits(found.fit_p_value));
+            format!("{name}: {} from {samples} samples ({span}); fit p = {p}{used}", chosen.model)
+        }
         None => format!("{}: the graphical recipe on {samples} samples ({span})", found.params.name),
     }
 }
@@ -292,100 +298,6 @@ fn duration(seconds: f64) -> String {
         s if s < 7200.0 => format!("{} min", digits(s / 60.0)),
         s => format!("{} h", digits(s / 3600.0)),
     }
-}
-
-fn parameter_rows(axis: &Axis, quantity: Quantity) -> Vec<Vec<String>> {
-    let row = |name: &str, value: &Measured, also: String| {
-        let [lower, upper] = value.interval.map_or(["-".into(), "-".into()], |i| i.map(digits));
-        vec![name.to_string(), digits(value.value), lower, upper, value.unit.to_string(), also]
-    };
-    let params = &axis.found.params;
-    let mut rows: Vec<Vec<String>> =
-        params.bias.iter().map(|b| row("bias (mean of this log)", b, String::new())).collect();
-    for term in &params.terms {
-        match term {
-            TermEntry::Quantization { coefficient } => rows.push(row("quantization Q", coefficient, String::new())),
-            TermEntry::White { density } => rows.push(row("white N", density, random_walk_name(density, quantity))),
-            TermEntry::MovingAverage { density, samples } => {
-                rows.push(row("moving average N", density, format!("over {samples} samples")));
-            }
-            TermEntry::Oscillation { std_dev, frequency, correlation_time } => {
-                rows.push(row("oscillation sigma", std_dev, String::new()));
-                rows.push(row("oscillation f0", frequency, String::new()));
-                rows.push(row("oscillation Tc", correlation_time, String::new()));
-            }
-            TermEntry::BiasInstability { coefficient } => {
-                rows.push(row("flicker B (bias instability)", coefficient, floor_name(coefficient, quantity)));
-            }
-            TermEntry::GaussMarkov { std_dev, correlation_time } => {
-                rows.push(row("Gauss-Markov sigma", std_dev, driving_name(std_dev, correlation_time)));
-                rows.push(row("Gauss-Markov Tc", correlation_time, String::new()));
-            }
-            TermEntry::RateRandomWalk { density } => {
-                rows.push(row("rate random walk K", density, walk_name(density, quantity)));
-            }
-            TermEntry::RateRamp { slope } => rows.push(row("rate ramp R", slope, String::new())),
-        }
-    }
-    rows
-}
-
-/// A value in another unit: "3.372 deg/sqrt(h)".
-fn in_unit(si: f64, unit: &str) -> Option<String> {
-    Unit::parse(unit).ok().map(|unit| format!("{} {unit}", digits(unit.from_si(si))))
-}
-
-/// The integral of white noise as datasheets call it.
-fn random_walk_name(density: &Measured, quantity: Quantity) -> String {
-    let (name, unit) = match quantity {
-        Quantity::AngularRate => ("angle random walk", "deg/sqrt(h)"),
-        Quantity::SpecificForce => ("velocity random walk", "m/s/sqrt(h)"),
-    };
-    in_unit(density.si(), unit).map_or_else(String::new, |value| format!("{name} {value}"))
-}
-
-fn floor_name(coefficient: &Measured, quantity: Quantity) -> String {
-    let unit = match quantity {
-        Quantity::AngularRate => "deg/h",
-        Quantity::SpecificForce => "mg",
-    };
-    let floor = (2.0 * std::f64::consts::LN_2 / std::f64::consts::PI).sqrt() * coefficient.si();
-    in_unit(floor, unit).map_or_else(String::new, |value| format!("Allan floor 0.6643 B = {value}"))
-}
-
-/// The driving noise of a Gauss-Markov process: the random walk it is at short times.
-fn driving_name(std_dev: &Measured, correlation_time: &Measured) -> String {
-    let unit = std_dev.unit.times_time(-1);
-    let driving = std_dev.si() * (2.0 / correlation_time.si()).sqrt();
-    format!("driving noise {} {unit}", digits(unit.from_si(driving)))
-}
-
-fn walk_name(density: &Measured, quantity: Quantity) -> String {
-    let unit = match quantity {
-        Quantity::AngularRate => "deg/h/sqrt(h)",
-        Quantity::SpecificForce => "mg/sqrt(h)",
-    };
-    in_unit(density.si(), unit).unwrap_or_default()
-}
-
-fn candidate_rows(candidates: &[Candidate]) -> Vec<Vec<String>> {
-    let shown = |(place, c): &(usize, &Candidate)| *place < SHOWN_CANDIDATES || c.chosen;
-    let row = |(_, c): (usize, &Candidate)| {
-        let mark = match (c.chosen, c.identified) {
-            (true, _) => "chosen",
-            (false, false) => "not identified",
-            (false, true) => "",
-        };
-        vec![
-            c.model.clone(),
-            c.parameters.to_string(),
-            digits(c.chi_square),
-            c.dof.to_string(),
-            digits(c.score),
-            mark.to_string(),
-        ]
-    };
-    candidates.iter().enumerate().filter(shown).map(row).collect()
 }
 
 fn step_rows(steps: &[Step]) -> Vec<Vec<String>> {

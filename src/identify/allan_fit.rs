@@ -86,11 +86,12 @@ pub(super) fn identify(
         },
         model,
         candidates: candidates(&table, fit),
+        precision: vec![],
         not_identified,
         warnings,
         steps: vec![],
         fit_p_value: fit.p_value(),
-        first_tau_s: table.points.first_tau_s(),
+        first_tau_s: Some(table.points.first_tau_s()),
         curve,
     })
 }
@@ -99,8 +100,10 @@ fn candidates(table: &Table, chosen: &Fit) -> Vec<Candidate> {
     let row = |fit: &Fit| Candidate {
         model: fit.shape.label(),
         parameters: fit.shape.parameters(),
-        chi_square: fit.chi_square,
-        dof: fit.dof(),
+        chi_square: Some(fit.chi_square),
+        dof: Some(fit.dof()),
+        log_likelihood: None,
+        held_out: None,
         score: score(fit),
         identified: unknown(fit).is_empty(),
         chosen: fit.shape == chosen.shape,

@@ -111,11 +111,12 @@ pub(super) fn identify(name: &str, rate: &[f64], dt: f64, display: &Unit) -> Res
         model,
         curve,
         candidates: vec![],
+        precision: vec![],
         not_identified,
         warnings,
         steps,
         fit_p_value: f64::NAN,
-        first_tau_s: dt,
+        first_tau_s: Some(dt),
     })
 }
 

@@ -5,6 +5,7 @@
 
 pub mod allan_fit;
 pub mod graphical;
+mod likelihood;
 mod points;
 mod selection;
 mod shape;
@@ -29,6 +30,8 @@ pub enum Method {
     Graphical,
     /// Generalised least squares on the whole overlapping Allan curve, terms chosen by score: [`allan_fit`].
     Allan,
+    /// Maximum likelihood on the cosine coefficients of the log, terms chosen by score; see `likelihood`.
+    Likelihood,
 }
 
 impl Method {
@@ -37,6 +40,7 @@ impl Method {
         match self {
             Method::Graphical => "graphical",
             Method::Allan => "allan",
+            Method::Likelihood => "likelihood",
         }
     }
 }
@@ -54,14 +58,33 @@ pub enum ModelChoice {
 pub struct Candidate {
     pub model: String,
     pub parameters: usize,
-    /// Weighted sum of squares of the fit.
-    pub chi_square: f64,
-    pub dof: f64,
-    /// χ² plus 4 for every parameter and every process.
+    /// Weighted sum of squares of the Allan fit and its degrees of freedom.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub chi_square: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dof: Option<f64>,
+    /// ln L of the whole log.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub log_likelihood: Option<f64>,
+    /// ln L of the last third of the log under the parameters that the first two thirds give.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<f64>,
+    /// Lowest wins. Allan fit: χ² plus 4 for every parameter and every process; likelihood: −2 ln L plus a cost for every process.
     pub score: f64,
     /// Every parameter has a 95 % interval that says something.
     pub identified: bool,
     pub chosen: bool,
+}
+
+/// How well one parameter is known, in percent of itself.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct Precision {
+    /// `gauss_markov.std_dev`.
+    pub parameter: String,
+    /// Standard deviation from the curvature of the likelihood.
+    pub std_dev_percent: f64,
+    /// Cramér-Rao bound: no unbiased estimate from a log like this has a smaller standard deviation.
+    pub cramer_rao_percent: f64,
 }
 
 /// What one axis gave.
@@ -74,6 +97,8 @@ pub struct Identified {
     pub curve: AllanCurve,
     /// Best score first; empty for the graphical recipe.
     pub candidates: Vec<Candidate>,
+    /// Likelihood only.
+    pub precision: Vec<Precision>,
     pub not_identified: Vec<NotIdentified>,
     /// Sentences for a person.
     pub warnings: Vec<String>,
@@ -81,8 +106,8 @@ pub struct Identified {
     pub steps: Vec<graphical::Step>,
     /// p-value of the chosen model's fit (NaN for graphical).
     pub fit_p_value: f64,
-    /// Shortest averaging time that was used, s.
-    pub first_tau_s: f64,
+    /// Shortest averaging time that an Allan fit used, s.
+    pub first_tau_s: Option<f64>,
 }
 
 #[derive(Clone, Debug, thiserror::Error)]
@@ -108,6 +133,7 @@ pub fn identify_axis(
     match method {
         Method::Graphical => graphical::identify(name, rate, dt, display),
         Method::Allan => allan_fit::identify(name, rate, dt, display, choice),
+        Method::Likelihood => likelihood::identify(name, rate, dt, display, choice),
     }
 }
 

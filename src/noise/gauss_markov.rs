@@ -10,11 +10,32 @@ use super::second_difference::{Side, WEIGHTS, side};
 use super::{Realisation, SamplePath};
 use crate::numerics::random::normal;
 
-/// dt σ² (1 − φ²)/((1 − φ)² + 4 φ sin²(π f dt)).
+/// dt σ² (1 − φ²)/((1 − φ)² + 4 φ sin²(π f dt)) as a function of the sine.
+#[derive(Clone, Copy)]
+pub(super) struct Spectrum {
+    numerator: f64,
+    constant: f64,
+    slope: f64,
+}
+
+impl Spectrum {
+    pub(super) fn new(std_dev: f64, correlation_time: f64, dt: f64) -> Spectrum {
+        let x = dt / correlation_time;
+        Spectrum {
+            numerator: dt * std_dev * std_dev * -(-2.0 * x).exp_m1(),
+            constant: (-x).exp_m1().powi(2),
+            slope: 4.0 * (-x).exp(),
+        }
+    }
+
+    /// At sin(π f dt).
+    pub(super) fn at(&self, sin: f64) -> f64 {
+        self.numerator / (self.constant + self.slope * sin * sin)
+    }
+}
+
 pub(super) fn psd(std_dev: f64, correlation_time: f64, f_hz: f64, dt: f64) -> f64 {
-    let x = dt / correlation_time;
-    let s = 2.0 * (std::f64::consts::PI * f_hz * dt).sin();
-    dt * std_dev * std_dev * -(-2.0 * x).exp_m1() / ((-x).exp_m1().powi(2) + (-x).exp() * s * s)
+    Spectrum::new(std_dev, correlation_time, dt).at((std::f64::consts::PI * f_hz * dt).sin())
 }
 
 /// σ² φ^lag.

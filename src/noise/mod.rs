@@ -6,6 +6,7 @@
 
 mod bias_instability;
 mod gauss_markov;
+mod grid;
 mod moving_average;
 mod oscillation;
 mod quantization;
@@ -14,6 +15,7 @@ mod random_walk;
 mod second_difference;
 mod white;
 
+pub use grid::Grid;
 use nalgebra::{DMatrix, RowDVector};
 use rand::rngs::ChaCha8Rng;
 use schemars::JsonSchema;

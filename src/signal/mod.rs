@@ -2,6 +2,7 @@
 
 pub mod check;
 pub mod correlation;
+pub mod cosine;
 pub mod spectrum;
 
 use crate::units::{Quantity, Unit};

@@ -1,9 +1,6 @@
 //! Figures and the report page of an identification.
 
-use super::{
-    Axis, CANDIDATES, CANDIDATES_CAPTION, PARAMETERS, STEPS, candidate_rows, costs, headline, not_identified,
-    parameter_rows, step_rows,
-};
+use super::{Axis, STEPS, costs, headline, not_identified, step_rows, tables};
 use crate::cli::allan_figure;
 use crate::params::Params;
 use crate::report::figure;
@@ -41,10 +38,11 @@ pub(super) fn page(params: &Params, axes: &[Axis]) -> Result<String, PageError> 
 
 fn section(axis: &Axis, params: &Params) -> Section {
     let found = &axis.found;
+    let parameters = tables::parameters(axis, params.quantity);
     let mut section = Section::new(found.params.name.clone()).paragraph(format!("{}.", headline(axis))).table(
-        "Parameters with 95 % intervals",
-        &PARAMETERS,
-        parameter_rows(axis, params.quantity),
+        parameters.caption,
+        parameters.header,
+        parameters.rows,
     );
     for warning in &found.warnings {
         section = section.warning(warning.clone());
@@ -58,8 +56,8 @@ fn section(axis: &Axis, params: &Params) -> Section {
             .paragraph("What this log does not tell:")
             .list(found.not_identified.iter().map(not_identified).collect());
     }
-    if !found.candidates.is_empty() {
-        section = section.table(CANDIDATES_CAPTION, &CANDIDATES, candidate_rows(&found.candidates));
+    if let Some(candidates) = tables::candidates(&found.candidates) {
+        section = section.table(candidates.caption, candidates.header, candidates.rows);
     }
     if !found.steps.is_empty() {
         section = section.table("The recipe, step by step", &STEPS, step_rows(&found.steps)).list(costs(&found.steps));

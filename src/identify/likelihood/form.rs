@@ -1,0 +1,134 @@
+//! Which processes a model has, and its parameters as logarithms.
+
+use std::ops::Range;
+
+use super::super::shape::{Role, roles};
+use crate::noise::{Kind, Term};
+
+/// One process of a model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(super) enum Piece {
+    White,
+    /// Over so many samples.
+    MovingAverage(u32),
+    Quantization,
+    Oscillation,
+    Flicker,
+    GaussMarkov,
+    RandomWalk,
+    Ramp,
+}
+
+impl Piece {
+    /// Parameters that stand in the spectrum. The slope of a ramp is none of them: its best value follows from the others.
+    pub(super) fn roles(self) -> &'static [Role] {
+        if self == Piece::Ramp { &[] } else { roles(self.kind()) }
+    }
+
+    pub(super) fn kind(self) -> Kind {
+        match self {
+            Piece::White => Kind::White,
+            Piece::MovingAverage(_) => Kind::MovingAverage,
+            Piece::Quantization => Kind::Quantization,
+            Piece::Oscillation => Kind::Oscillation,
+            Piece::Flicker => Kind::BiasInstability,
+            Piece::GaussMarkov => Kind::GaussMarkov,
+            Piece::RandomWalk => Kind::RateRandomWalk,
+            Piece::Ramp => Kind::RateRamp,
+        }
+    }
+
+    /// The process at these values (not logarithms); none for a ramp.
+    pub(super) fn term(self, values: &[f64]) -> Option<Term> {
+        Some(match (self, values) {
+            (Piece::White, &[density]) => Term::White { density },
+            (Piece::MovingAverage(samples), &[density]) => Term::MovingAverage { density, samples },
+            (Piece::Quantization, &[coefficient]) => Term::Quantization { coefficient },
+            (Piece::Oscillation, &[std_dev, frequency_hz, correlation_time]) => {
+                Term::Oscillation { std_dev, frequency_hz, correlation_time }
+            }
+            (Piece::Flicker, &[coefficient]) => Term::BiasInstability { coefficient },
+            (Piece::GaussMarkov, &[std_dev, correlation_time]) => Term::GaussMarkov { std_dev, correlation_time },
+            (Piece::RandomWalk, &[density]) => Term::RateRandomWalk { density },
+            _ => return None,
+        })
+    }
+
+    /// In `--model`.
+    fn short_name(self) -> String {
+        match self {
+            Piece::MovingAverage(samples) => format!("ma{samples}"),
+            piece => super::super::shape::short_name(piece.kind()).to_string(),
+        }
+    }
+}
+
+/// The processes of a model; Gauss-Markov and oscillation may stand more than once.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(super) struct Form {
+    pieces: Vec<Piece>,
+}
+
+impl Form {
+    pub(super) fn new(mut pieces: Vec<Piece>) -> Form {
+        pieces.sort_unstable();
+        Form { pieces }
+    }
+
+    pub(super) fn pieces(&self) -> &[Piece] {
+        &self.pieces
+    }
+
+    pub(super) fn count(&self, kind: Kind) -> usize {
+        self.pieces.iter().filter(|piece| piece.kind() == kind).count()
+    }
+
+    pub(super) fn has(&self, kind: Kind) -> bool {
+        self.count(kind) > 0
+    }
+
+    /// Piece and role of every logarithm, in order.
+    pub(super) fn roles(&self) -> Vec<(usize, Role)> {
+        let of = |(i, piece): (usize, &Piece)| piece.roles().iter().map(move |role| (i, *role)).collect::<Vec<_>>();
+        self.pieces.iter().enumerate().flat_map(of).collect()
+    }
+
+    /// Number of parameters, the slope of a ramp included.
+    pub(super) fn parameters(&self) -> usize {
+        self.pieces.iter().map(|piece| piece.roles().len().max(1)).sum()
+    }
+
+    /// The logarithms of each piece.
+    pub(super) fn split<'a>(&'a self, logs: &'a [f64]) -> impl Iterator<Item = (Piece, &'a [f64])> {
+        let mut rest = logs;
+        self.pieces.iter().map(move |piece| {
+            let (own, later) = rest.split_at(piece.roles().len().min(rest.len()));
+            rest = later;
+            (*piece, own)
+        })
+    }
+
+    /// This form and its logarithms with one piece more, and where its logarithms are.
+    pub(super) fn with(&self, logs: &[f64], piece: Piece, own: &[f64]) -> (Form, Vec<f64>, Range<usize>) {
+        let at = self.pieces.partition_point(|p| *p <= piece);
+        let before: usize = self.pieces[..at].iter().map(|p| p.roles().len()).sum();
+        let (mut pieces, mut all) = (self.pieces.clone(), logs.to_vec());
+        pieces.insert(at, piece);
+        all.splice(before..before, own.iter().copied());
+        (Form { pieces }, all, before..before + own.len())
+    }
+
+    /// This form and its logarithms without piece number `at`.
+    pub(super) fn without(&self, logs: &[f64], at: usize) -> (Form, Vec<f64>) {
+        let before: usize = self.pieces[..at].iter().map(|p| p.roles().len()).sum();
+        let (mut pieces, mut all) = (self.pieces.clone(), logs.to_vec());
+        let piece = pieces.remove(at);
+        all.drain(before..before + piece.roles().len());
+        (Form { pieces }, all)
+    }
+
+    /// "white+gm+rrw".
+    pub(super) fn label(&self) -> String {
+        self.pieces.iter().map(|piece| piece.short_name()).collect::<Vec<_>>().join("+")
+    }
+}

@@ -1,0 +1,412 @@
+//! Maximum likelihood on the cosine coefficients of the log: terms chosen, intervals given, the Cramér-Rao bound beside them.
+//!
+//! `ordinates` is the log in bins, `form` what a model consists of, `whittle` the likelihood and its maximum, `growth` the choice of the
+//! terms, `interval` what is known of each parameter.
+
+mod form;
+mod growth;
+mod interval;
+mod ordinates;
+mod whittle;
+
+use super::shape::Role;
+use super::shape::document_name;
+use super::{Candidate, Identified, IdentifyError, ModelChoice, Precision as Known, bias, entry, usable};
+use crate::allan::{self, Deviation, TauGrid};
+use crate::noise::{Kind, NoiseModel, Term};
+use crate::numerics::distribution::kolmogorov_sf;
+use crate::params::{AxisParams, NotIdentified};
+use crate::units::{Unit, digits};
+use form::{Form, Piece};
+use growth::score;
+use interval::{Precision, precisions};
+use ordinates::Ordinates;
+use whittle::Fit;
+
+/// Points of the shown Allan curve per decade of averaging time.
+const POINTS_PER_DECADE: usize = 5;
+/// Largest upper/lower ratio of a 95 % interval that still says something.
+const WIDEST_INTERVAL: f64 = 10.0;
+/// A fit below this probability is reported as bad.
+const FIT_LEVEL: f64 = 1e-3;
+/// A model this close in score to the chosen one explains the log about as well.
+const CLOSE: f64 = 6.0;
+/// A random walk and a Gauss-Markov process differ visibly in a log of this many correlation times.
+const LENGTHS_TO_TELL: f64 = 20.0;
+/// Candidates whose parameters are looked at, at most.
+const LOOKED_AT: usize = 12;
+/// Candidates that are tried on the part of the log they have not seen.
+const HELD_OUT: usize = 6;
+/// Two-sided 95 % point of the normal distribution.
+const NORMAL_95: f64 = 1.959_963_985;
+/// Share of the log to which the candidates are fitted for that.
+const FITTED_SHARE: f64 = 2.0 / 3.0;
+
+pub(super) fn identify(
+    name: &str,
+    rate: &[f64],
+    dt: f64,
+    display: &Unit,
+    choice: &ModelChoice,
+) -> Result<Identified, IdentifyError> {
+    usable(name, rate)?;
+    let failed = |message: String| IdentifyError { message: format!("{name}: {message}") };
+    let data = Ordinates::new(rate, dt, None);
+    let (fits, forced) = match choice {
+        ModelChoice::Auto => {
+            let visited = growth::grow(&data);
+            (visited.ranked(&data).into_iter().take(LOOKED_AT).cloned().collect::<Vec<Fit>>(), false)
+        }
+        ModelChoice::Terms(kinds) => (forms(kinds).iter().filter_map(|form| growth::fit(&data, form)).collect(), true),
+    };
+    let mut fits: Vec<(Fit, Vec<Precision>)> = fits
+        .into_iter()
+        .map(|fit| {
+            let known = precisions(&data, &fit);
+            (fit, known)
+        })
+        .collect();
+    fits.sort_by(|a, b| score(&a.0, &data).total_cmp(&score(&b.0, &data)));
+    let chosen =
+        if forced { 0 } else { fits.iter().position(|(fit, known)| unknown(fit, known).is_empty()).unwrap_or(0) };
+    let Some((fit, known)) = fits.get(chosen) else {
+        return Err(failed(format!("{} samples say nothing about any noise term; use a longer log", rate.len())));
+    };
+
+    let words = Words { data: &data, display };
+    let terms = known_terms(&data, fit, known);
+    let model = NoiseModel { terms: terms.iter().map(|found| found.term).collect() };
+    let mut curve =
+        allan::curve(rate, dt, Deviation::Oadev, TauGrid::Log(POINTS_PER_DECADE)).map_err(|e| failed(e.to_string()))?;
+    curve.refine(&model);
+    let mut not_identified = words.unknown_parameters(fit, known);
+    if !forced {
+        if let Some((best, of_best)) = fits.first().filter(|_| chosen > 0) {
+            not_identified.extend(words.unknown_parameters(best, of_best));
+        }
+        not_identified.extend(words.look_alikes(&fits, chosen));
+        not_identified.extend(words.no_drift(fit));
+    }
+    let fit_p_value = goodness(&data, fit);
+    let held_out = held_out(rate, &data, &fits);
+    let candidate = |(i, (fit, known)): (usize, &(Fit, Vec<Precision>))| Candidate {
+        model: fit.form.label(),
+        parameters: fit.form.parameters(),
+        chi_square: None,
+        dof: None,
+        log_likelihood: Some(fit.log_likelihood),
+        held_out: held_out.get(i).copied().flatten(),
+        score: score(fit, &data),
+        identified: unknown(fit, known).is_empty(),
+        chosen: i == chosen,
+    };
+    let candidates = fits.iter().enumerate().map(candidate).collect();
+    Ok(Identified {
+        params: AxisParams {
+            name: name.into(),
+            bias: Some(bias(rate, dt, &model, display)),
+            turn_on_bias: None,
+            terms: terms.iter().map(|found| entry(&found.term, &found.intervals, display)).collect::<Result<_, _>>()?,
+            not_identified: not_identified.clone(),
+        },
+        precision: known_precision(&terms),
+        warnings: words.warnings(fit, fit_p_value),
+        model,
+        candidates,
+        not_identified,
+        steps: vec![],
+        fit_p_value,
+        first_tau_s: None,
+        curve,
+    })
+}
+
+/// The forms that a list of kinds may mean: the length of a moving average is open.
+fn forms(kinds: &[Kind]) -> Vec<Form> {
+    let with_average = |samples: u32| {
+        let piece = |kind: &Kind| match kind {
+            Kind::White => Piece::White,
+            Kind::MovingAverage => Piece::MovingAverage(samples),
+            Kind::Quantization => Piece::Quantization,
+            Kind::Oscillation => Piece::Oscillation,
+            Kind::BiasInstability => Piece::Flicker,
+            Kind::GaussMarkov => Piece::GaussMarkov,
+            Kind::RateRandomWalk => Piece::RandomWalk,
+            Kind::RateRamp => Piece::Ramp,
+        };
+        Form::new(kinds.iter().map(piece).collect())
+    };
+    let mut all: Vec<Form> = (2..=4).map(with_average).collect();
+    all.dedup();
+    all
+}
+
+/// Numbers of the drift parameters whose interval says nothing. What is faster is judged by the filter's innovations, not by its numbers.
+fn unknown(fit: &Fit, known: &[Precision]) -> Vec<usize> {
+    let drift = |i: &usize| fit.form.pieces()[fit.form.roles()[*i].0].kind().is_drift();
+    wide(known).into_iter().filter(drift).collect()
+}
+
+/// Numbers of all parameters whose interval says nothing.
+fn wide(known: &[Precision]) -> Vec<usize> {
+    let wide = |p: &Precision| p.interval().is_none_or(|[low, high]| high - low > WIDEST_INTERVAL.ln());
+    (0..known.len()).filter(|i| wide(&known[*i])).collect()
+}
+
+/// A process with what is known of its parameters.
+struct Found {
+    term: Term,
+    /// 95 %, SI.
+    intervals: Vec<Option<[f64; 2]>>,
+    /// Relative standard deviation and its bound.
+    precision: Vec<[f64; 2]>,
+}
+
+/// The terms but for drift that is not identified.
+fn known_terms(data: &Ordinates, fit: &Fit, known: &[Precision]) -> Vec<Found> {
+    let unknown = unknown(fit, known);
+    let mut first = 0;
+    let mut found = Vec::new();
+    for (piece, own) in fit.form.split(&fit.logs) {
+        let indices = first..first + own.len();
+        first = indices.end;
+        let of = &known[indices.clone()];
+        let mut values: Vec<f64> = own.iter().map(|v| v.exp()).collect();
+        // a filter needs some measurement noise: where the log sets only an upper limit, half of that
+        if let (Piece::White, [Precision { lower: None, upper: Some(upper), .. }]) = (piece, of) {
+            values[0] = values[0].max(0.5 * upper.exp());
+        }
+        match piece.term(&values) {
+            Some(term) if !indices.clone().any(|i| unknown.contains(&i)) => found.push(Found {
+                term,
+                intervals: of.iter().map(|p| p.interval().map(|limits| limits.map(f64::exp))).collect(),
+                precision: of.iter().map(|p| [p.sigma, p.bound]).collect(),
+            }),
+            Some(_) => {}
+            None => {
+                let sigma = whittle::slope_sigma(data, fit);
+                let relative = (sigma / fit.slope).abs();
+                found.push(Found {
+                    term: Term::RateRamp { slope: fit.slope },
+                    intervals: vec![Some([fit.slope - NORMAL_95 * sigma, fit.slope + NORMAL_95 * sigma])],
+                    precision: vec![[relative; 2]],
+                });
+            }
+        }
+    }
+    let order = |term: &Term| match *term {
+        Term::GaussMarkov { correlation_time, .. } => correlation_time,
+        Term::Oscillation { frequency_hz, .. } => frequency_hz,
+        _ => 0.0,
+    };
+    found.sort_by(|a, b| a.term.kind().cmp(&b.term.kind()).then(order(&a.term).total_cmp(&order(&b.term))));
+    found
+}
+
+/// Names as in params.json.
+fn known_precision(terms: &[Found]) -> Vec<Known> {
+    let mut all = Vec::new();
+    for (i, found) in terms.iter().enumerate() {
+        let kind = found.term.kind();
+        let number = terms[..i].iter().filter(|other| other.term.kind() == kind).count();
+        let names = super::shape::roles(kind).iter().map(|role| parameter_name(kind, number, *role));
+        all.extend(names.zip(&found.precision).map(|(parameter, [sigma, bound])| Known {
+            parameter,
+            std_dev_percent: 100.0 * sigma,
+            cramer_rao_percent: 100.0 * bound,
+        }));
+    }
+    all
+}
+
+/// `gauss_markov[1].std_dev`.
+fn parameter_name(kind: Kind, number: usize, role: Role) -> String {
+    let place =
+        if number == 0 { document_name(kind).to_string() } else { format!("{}[{number}]", document_name(kind)) };
+    match role {
+        Role::CorrelationTime => format!("{place}.correlation_time"),
+        Role::Frequency => format!("{place}.frequency"),
+        Role::Coefficient => match kind {
+            Kind::GaussMarkov | Kind::Oscillation => format!("{place}.std_dev"),
+            Kind::White | Kind::MovingAverage | Kind::RateRandomWalk => format!("{place}.density"),
+            Kind::RateRamp => format!("{place}.slope"),
+            Kind::Quantization | Kind::BiasInstability => format!("{place}.coefficient"),
+        },
+    }
+}
+
+/// Probability that the cumulative spectrum of the log, divided by that of the model, departs from a straight line as it does.
+///
+/// With u_j = P_j/S_j ~ χ²₁ independent, D = max |Σ_{i≤j} u_i/Σ u − j/n| and D √(n/2) has Kolmogorov's law (Bartlett 1954).
+fn goodness(data: &Ordinates, fit: &Fit) -> f64 {
+    let of = |(bin, s): (&ordinates::Bin, &f64)| bin.left(fit.slope) / s;
+    let whitened: Vec<f64> = data.bins.iter().zip(&fit.spectrum(data)).map(of).collect();
+    let (total, count) = (whitened.iter().sum::<f64>(), data.bins.iter().map(|bin| bin.count).sum::<f64>());
+    let (mut sum, mut before, mut distance) = (0.0, 0.0, 0.0f64);
+    for (u, bin) in whitened.iter().zip(&data.bins) {
+        sum += u;
+        before += bin.count;
+        distance = distance.max((sum / total - before / count).abs());
+    }
+    kolmogorov_sf(distance * (count / 2.0).sqrt())
+}
+
+/// ln L of the last third of the log under the parameters that the first two thirds give, by candidate.
+fn held_out(rate: &[f64], data: &Ordinates, fits: &[(Fit, Vec<Precision>)]) -> Vec<Option<f64>> {
+    use rayon::prelude::*;
+    let (early, late) = rate.split_at((rate.len() as f64 * FITTED_SHARE) as usize);
+    let [early, late] = [early, late].map(|part| Ordinates::new(part, data.dt, Some(&data.lines)));
+    let of = |(fit, _): &(Fit, Vec<Precision>)| {
+        let seen = whittle::climb_all(&early, &fit.form, &fit.logs)?;
+        Some(whittle::log_likelihood(&late, &fit.form, &seen.logs))
+    };
+    fits.par_iter().take(HELD_OUT).map(of).collect()
+}
+
+/// Sentences about one axis, numbers in the unit of the log.
+struct Words<'a> {
+    data: &'a Ordinates,
+    display: &'a Unit,
+}
+
+impl Words<'_> {
+    fn name(fit: &Fit, index: usize) -> String {
+        let (piece, role) = fit.form.roles()[index];
+        let kind = fit.form.pieces()[piece].kind();
+        let number = fit.form.pieces()[..piece].iter().filter(|p| p.kind() == kind).count();
+        parameter_name(kind, number, role)
+    }
+
+    /// A value of one parameter in the unit of the log.
+    fn shown(&self, fit: &Fit, index: usize, log: f64) -> String {
+        let (piece, role) = fit.form.roles()[index];
+        match role {
+            Role::CorrelationTime => format!("{} s", digits(log.exp())),
+            Role::Frequency => format!("{} Hz", digits(log.exp())),
+            Role::Coefficient => {
+                let unit = super::coefficient_unit(fit.form.pieces()[piece].kind(), self.display);
+                format!("{} {unit}", digits(unit.from_si(log.exp())))
+            }
+        }
+    }
+
+    fn unknown_parameters(&self, fit: &Fit, known: &[Precision]) -> Vec<NotIdentified> {
+        let line = |i: &usize| fit.form.pieces()[fit.form.roles()[*i].0] != Piece::Oscillation;
+        wide(known).into_iter().filter(line).map(|i| self.not_identified(fit, i, &known[i])).collect()
+    }
+
+    fn not_identified(&self, fit: &Fit, index: usize, known: &Precision) -> NotIdentified {
+        let span = digits(self.data.span_s());
+        let value = |log: f64| self.shown(fit, index, log);
+        let reason = match (known.lower, known.upper) {
+            (Some(low), None) => format!("above {} (97.5 %); the {span} s log sets no upper limit", value(low)),
+            (None, Some(high)) => format!("below {} (97.5 %); the {span} s log sets no lower limit", value(high)),
+            (Some(low), Some(high)) => format!("between {} and {} (95 %) in the {span} s log", value(low), value(high)),
+            (None, None) => format!("the {span} s log bounds it on no side"),
+        };
+        // widths shrink like T^(−1/2)
+        let needed = self.data.span_s() * (2.0 * 1.96 * known.bound / WIDEST_INTERVAL.ln()).powi(2);
+        NotIdentified {
+            term: Words::name(fit, index),
+            reason: format!("{reason}, model {}", fit.form.label()),
+            needed_log_s: (needed.is_finite() && needed > self.data.span_s()).then_some(needed),
+        }
+    }
+
+    /// Models of other drift that explain the log about as well.
+    fn look_alikes(&self, fits: &[(Fit, Vec<Precision>)], chosen: usize) -> Vec<NotIdentified> {
+        let own = &fits[chosen].0;
+        let slow = |fit: &Fit| {
+            let kinds = fit.form.pieces().iter().map(|p| p.kind());
+            kinds
+                .filter(|k| {
+                    matches!(k, Kind::BiasInstability | Kind::GaussMarkov | Kind::RateRandomWalk | Kind::RateRamp)
+                })
+                .collect::<Vec<_>>()
+        };
+        let mut found: Vec<NotIdentified> = Vec::new();
+        for (i, (fit, known)) in fits.iter().enumerate() {
+            // something more is no look-alike
+            let more =
+                own.form.pieces().iter().all(|piece| fit.form.count(piece.kind()) >= own.form.count(piece.kind()));
+            let new: Vec<Kind> = slow(fit).into_iter().filter(|k| !own.form.has(*k)).collect();
+            let [kind] = new[..] else { continue };
+            let worse = score(fit, self.data) - score(own, self.data);
+            if i == chosen || more || worse.abs() >= CLOSE || found.iter().any(|f| f.term == document_name(kind)) {
+                continue;
+            }
+            let time = fit.form.roles().iter().position(|(piece, role)| {
+                kind == Kind::GaussMarkov && *role == Role::CorrelationTime && fit.form.pieces()[*piece].kind() == kind
+            });
+            let estimate = time.map(|i| fit.logs[i].exp()).filter(|time| *time < self.data.span_s());
+            let at_least = time.and_then(|i| known[i].lower.filter(|_| known[i].upper.is_none()));
+            let at = match (at_least, estimate) {
+                (Some(low), _) => format!(", correlation time above {} s (97.5 %)", digits(low.exp())),
+                (None, Some(time)) => format!(", correlation time about {} s", digits(time)),
+                (None, None) => String::new(),
+            };
+            found.push(NotIdentified {
+                term: document_name(kind).into(),
+                reason: format!(
+                    "{} explains the log about as well as {} (score {worse:+.2}{at}): the log does not tell them apart",
+                    fit.form.label(),
+                    own.form.label(),
+                ),
+                needed_log_s: estimate.map(|time| (LENGTHS_TO_TELL * time).max(2.0 * self.data.span_s())),
+            });
+        }
+        found
+    }
+
+    /// No drift: how much random walk would have shown.
+    fn no_drift(&self, fit: &Fit) -> Vec<NotIdentified> {
+        let slow = [Kind::BiasInstability, Kind::GaussMarkov, Kind::RateRandomWalk, Kind::RateRamp];
+        if slow.iter().any(|kind| fit.form.has(*kind)) {
+            return vec![];
+        }
+        let limit = self.largest_walk(fit).map_or_else(String::new, |density| {
+            let unit = super::coefficient_unit(Kind::RateRandomWalk, self.display);
+            format!("; a random walk above {} {unit} would have shown (95 %)", digits(unit.from_si(density)))
+        });
+        vec![NotIdentified {
+            term: document_name(Kind::RateRandomWalk).into(),
+            reason: format!("no drift is seen above the white noise in {} s{limit}", digits(self.data.span_s())),
+            needed_log_s: None,
+        }]
+    }
+
+    /// Density of a random walk that lowers ln L by χ²₁(0.90)/2.
+    fn largest_walk(&self, fit: &Fit) -> Option<f64> {
+        let touch = whittle::touching(self.data, &Term::RateRandomWalk { density: 1.0 });
+        let fall = |log: f64| {
+            let (form, logs, _) = fit.form.with(&fit.logs, Piece::RandomWalk, &[log]);
+            2.0 * (fit.log_likelihood - whittle::log_likelihood(self.data, &form, &logs)) - 2.706
+        };
+        let (mut low, mut high) = (touch - 9.0, touch + 6.0);
+        if fall(high).is_nan() || fall(high) <= 0.0 {
+            return None;
+        }
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if fall(middle) < 0.0 { low = middle } else { high = middle }
+        }
+        Some(high.exp())
+    }
+
+    fn warnings(&self, fit: &Fit, p_value: f64) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if fit.decrement > 1e-2 || fit.decrement.is_nan() {
+            warnings.push(format!(
+                "the search for the maximum has not converged (another step would gain {} in ln L)",
+                digits(0.5 * fit.decrement)
+            ));
+        }
+        if p_value < FIT_LEVEL {
+            warnings.push(format!(
+                "the model does not explain the spectrum (cumulative periodogram, p = {}): intervals are too narrow",
+                digits(p_value)
+            ));
+        }
+        warnings
+    }
+}

@@ -1,0 +1,338 @@
+//! Whittle's likelihood on cosine coefficients, its maximum and its information.
+//!
+//! The coefficients c_j of n samples are nearly independent N(0, S(f_j)/dt), S the sampled spectrum of the model:
+//! −ln L = ½ Σ_j [ln(2π S_j/dt) + dt (c_j − a r_j)²/S_j], a the slope of a ramp and r_j its coefficients. The slope
+//! is eliminated: a = Σ dt c r/S / Σ dt r²/S. Expected information of the log parameters: I_ik = ½ Σ_j ∂_i ln S_j ∂_k ln S_j; its
+//! inverse is the Cramér-Rao bound.
+//! Sources: Whittle 1953; Kay 1993, section 3.11 (asymptotic bound).
+
+use nalgebra::DMatrix;
+use slsqp::{Func, StopTols, minimize};
+
+use super::super::shape::Role;
+use super::form::{Form, Piece};
+use super::ordinates::Ordinates;
+use crate::noise::{Kind, Term};
+
+/// The correlation time of a line is at least this many samples.
+const SHORTEST: f64 = 0.3;
+/// That of a drift; what is shorter is wideband noise: white, and averaged by the sensor.
+const SHORTEST_DRIFT: f64 = 2.0;
+/// And at most so many lengths of the log; beyond it a Gauss-Markov process is a random walk.
+const LONGEST: f64 = 10.0;
+/// Step of numerical derivatives by a logarithm.
+const STEP: f64 = 1e-4;
+
+/// The best parameters of one form.
+#[derive(Clone, Debug)]
+pub(super) struct Fit {
+    pub(super) form: Form,
+    pub(super) logs: Vec<f64>,
+    /// Of the ramp, unit/s; 0 without one.
+    pub(super) slope: f64,
+    /// Of the coefficients: all that n samples say apart from their mean.
+    pub(super) log_likelihood: f64,
+    /// gᵀ I⁻¹ g: what another step would still gain, twice, in log-likelihood.
+    pub(super) decrement: f64,
+}
+
+/// Spectrum and derivatives by the logarithms at every bin.
+struct Spectrum {
+    total: Vec<f64>,
+    /// ∂S/∂θ, by parameter.
+    derivatives: Vec<Vec<f64>>,
+}
+
+impl Fit {
+    /// At every bin, without a ramp.
+    pub(super) fn spectrum(&self, data: &Ordinates) -> Vec<f64> {
+        spectrum(data, &self.form, &self.logs, &Held::nothing(data, &self.form), false).total
+    }
+}
+
+/// What stays while others are searched: the pieces of which no logarithm is free.
+struct Held {
+    fixed: Vec<bool>,
+    /// Their spectrum.
+    total: Vec<f64>,
+}
+
+impl Held {
+    fn nothing(data: &Ordinates, form: &Form) -> Held {
+        Held { fixed: vec![false; form.pieces().len()], total: vec![0.0; data.bins.len()] }
+    }
+
+    fn new(data: &Ordinates, form: &Form, logs: &[f64], free: &[usize]) -> Held {
+        let mut held = Held::nothing(data, form);
+        let mut first = 0;
+        for (fixed, (piece, own)) in held.fixed.iter_mut().zip(form.split(logs)) {
+            let indices = first..first + own.len();
+            first = indices.end;
+            *fixed = !free.iter().any(|i| indices.contains(i));
+            let values: Vec<f64> = own.iter().map(|v| v.exp()).collect();
+            if let Some(term) = piece.term(&values).filter(|_| *fixed) {
+                held.total.iter_mut().zip(term.psd_on(&data.grid)).for_each(|(t, psd)| *t += psd);
+            }
+        }
+        held
+    }
+}
+
+fn spectrum(data: &Ordinates, form: &Form, logs: &[f64], held: &Held, with_derivatives: bool) -> Spectrum {
+    let mut total = held.total.clone();
+    let mut derivatives = Vec::new();
+    for ((piece, own), fixed) in form.split(logs).zip(&held.fixed) {
+        if *fixed {
+            if with_derivatives {
+                derivatives.extend(own.iter().map(|_| Vec::new()));
+            }
+            continue;
+        }
+        let at = |index: usize, shift: f64| {
+            let values: Vec<f64> =
+                own.iter().enumerate().map(|(i, v)| if i == index { (v + shift).exp() } else { v.exp() }).collect();
+            piece.term(&values).map(|term| term.psd_on(&data.grid)).unwrap_or_default()
+        };
+        if own.is_empty() {
+            continue;
+        }
+        let psd = at(0, 0.0);
+        total.iter_mut().zip(&psd).for_each(|(t, p)| *t += p);
+        if with_derivatives {
+            for (i, role) in piece.roles().iter().enumerate() {
+                derivatives.push(match role {
+                    Role::Coefficient => psd.iter().map(|p| 2.0 * p).collect(),
+                    Role::CorrelationTime | Role::Frequency => {
+                        // a line is as narrow as its correlation time is long
+                        let step = match (role, piece) {
+                            (Role::Frequency, Piece::Oscillation) => STEP.min(1e-2 / (own[1] + own[2]).exp()),
+                            _ => STEP,
+                        };
+                        let (above, below) = (at(i, step), at(i, -step));
+                        above.iter().zip(&below).map(|(a, b)| (a - b) / (2.0 * step)).collect()
+                    }
+                });
+            }
+        }
+    }
+    Spectrum { total, derivatives }
+}
+
+/// The slope of a ramp that the log suggests under this spectrum, and its standard deviation.
+fn slope(data: &Ordinates, form: &Form, total: &[f64]) -> (f64, f64) {
+    if !form.has(Kind::RateRamp) {
+        return (0.0, 0.0);
+    }
+    let (cross, own) = data
+        .bins
+        .iter()
+        .zip(total)
+        .fold((0.0, 0.0), |(cross, own), (bin, s)| (cross + bin.with_ramp / s, own + bin.ramp / s));
+    (cross / own, 1.0 / own.sqrt())
+}
+
+/// −ln L, and its gradient.
+fn objective(data: &Ordinates, form: &Form, logs: &[f64], held: &Held, gradient: Option<&mut [f64]>) -> f64 {
+    let Spectrum { total, derivatives } = spectrum(data, form, logs, held, gradient.is_some());
+    let (slope, _) = slope(data, form, &total);
+    let constant = (std::f64::consts::TAU / data.dt).ln();
+    let sum: f64 =
+        data.bins.iter().zip(&total).map(|(bin, s)| bin.count * (constant + s.ln()) + bin.left(slope) / s).sum();
+    if let Some(gradient) = gradient {
+        for (g, derivative) in gradient.iter_mut().zip(&derivatives) {
+            let terms = data.bins.iter().zip(&total).zip(derivative);
+            *g = 0.5 * terms.map(|((bin, s), d)| (bin.count - bin.left(slope) / s) * d / s).sum::<f64>();
+        }
+    }
+    0.5 * sum
+}
+
+/// Expected information of the logarithms.
+pub(super) fn expected_information(data: &Ordinates, form: &Form, logs: &[f64]) -> DMatrix<f64> {
+    information(data, form, logs, &Held::nothing(data, form))
+}
+
+/// Rows of held pieces are zero.
+fn information(data: &Ordinates, form: &Form, logs: &[f64], held: &Held) -> DMatrix<f64> {
+    let Spectrum { total, derivatives } = spectrum(data, form, logs, held, true);
+    let p = derivatives.len();
+    let weights: Vec<f64> = data.bins.iter().zip(&total).map(|(bin, s)| 0.5 * bin.count / (s * s)).collect();
+    let mut information = DMatrix::zeros(p, p);
+    for i in 0..p {
+        for k in 0..=i {
+            let products = weights.iter().zip(&derivatives[i]).zip(&derivatives[k]);
+            information[(i, k)] = products.map(|((w, a), b)| w * a * b).sum();
+        }
+    }
+    information.fill_upper_triangle_with_lower_triangle();
+    information
+}
+
+/// Second derivatives of −ln L by the logarithms.
+pub(super) fn observed_information(data: &Ordinates, fit: &Fit) -> DMatrix<f64> {
+    let p = fit.logs.len();
+    let expected = expected_information(data, &fit.form, &fit.logs);
+    let nothing = Held::nothing(data, &fit.form);
+    let mut information = DMatrix::zeros(p, p);
+    for i in 0..p {
+        // a hundredth of a standard deviation
+        let step = 0.01 / expected[(i, i)].sqrt().clamp(1e-2, 1e9);
+        let gradient = |shift: f64| {
+            let mut logs = fit.logs.clone();
+            logs[i] += shift;
+            let mut gradient = vec![0.0; p];
+            objective(data, &fit.form, &logs, &nothing, Some(&mut gradient));
+            gradient
+        };
+        let (above, below) = (gradient(step), gradient(-step));
+        for k in 0..p {
+            information[(i, k)] = (above[k] - below[k]) / (2.0 * step);
+        }
+    }
+    (&information + information.transpose()) * 0.5
+}
+
+/// Standard deviation of the slope of a ramp.
+pub(super) fn slope_sigma(data: &Ordinates, fit: &Fit) -> f64 {
+    slope(data, &fit.form, &fit.spectrum(data)).1
+}
+
+/// ln L of `form` at given parameters on other data.
+pub(super) fn log_likelihood(data: &Ordinates, form: &Form, logs: &[f64]) -> f64 {
+    -objective(data, form, logs, &Held::nothing(data, form), None)
+}
+
+/// Bounds of the logarithms; a line stays where the bins are as fine as around its start, and no narrower than they are.
+pub(super) fn bounds(data: &Ordinates, form: &Form, start: &[f64]) -> Vec<(f64, f64)> {
+    let [shortest, shortest_drift] = [SHORTEST, SHORTEST_DRIFT].map(|samples| (samples * data.dt).ln());
+    let of = |(piece, own): (Piece, &[f64])| {
+        let touch = touch(data, piece);
+        let coefficient = (touch.0 - 9.0, touch.1 + 5.0);
+        match piece {
+            Piece::Oscillation => {
+                let (low, high, width) = data.fine_around(own[1].exp());
+                let longest = (1.0 / (std::f64::consts::PI * width)).min(data.span_s());
+                vec![coefficient, (low.ln(), high.ln()), (shortest, longest.ln())]
+            }
+            Piece::GaussMarkov => vec![coefficient, (shortest_drift, (LONGEST * data.span_s()).ln())],
+            Piece::Ramp => vec![],
+            _ => vec![coefficient],
+        }
+    };
+    form.split(start).flat_map(of).collect()
+}
+
+/// ln of the coefficient with which a process alone touches the spectrum from below, for its extreme correlation times.
+fn touch(data: &Ordinates, piece: Piece) -> (f64, f64) {
+    let ends: Vec<Vec<f64>> = match piece {
+        Piece::GaussMarkov => [SHORTEST_DRIFT * data.dt, LONGEST * data.span_s()].map(|time| vec![1.0, time]).into(),
+        Piece::Oscillation => [SHORTEST * data.dt, data.span_s()].map(|time| vec![1.0, 0.25 / data.dt, time]).into(),
+        _ => vec![vec![1.0]],
+    };
+    let of = |values: &Vec<f64>| piece.term(values).map(|term| touching(data, &term));
+    let found: Vec<f64> = ends.iter().filter_map(of).collect();
+    let (low, high) = found.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    (low, high)
+}
+
+/// ln of the factor by which this process touches the spectrum from below; a few neighbouring bins are taken together.
+pub(super) fn touching(data: &Ordinates, term: &Term) -> f64 {
+    let mut least = f64::INFINITY;
+    let (mut power, mut own, mut count) = (0.0, 0.0, 0.0);
+    for (bin, psd) in data.bins.iter().zip(term.psd_on(&data.grid)) {
+        power += bin.power;
+        own += bin.count * psd;
+        count += bin.count;
+        if count >= 8.0 {
+            if own > 0.0 {
+                least = least.min(power / own);
+            }
+            (power, own, count) = (0.0, 0.0, 0.0);
+        }
+    }
+    if least.is_finite() && least > 0.0 { 0.5 * least.ln() } else { 0.0 }
+}
+
+/// The maximum from a start by the logarithms of `free` alone, within bounds. None when nothing finite was met.
+///
+/// SLSQP (Kraft 1988) on logarithms scaled by their information, restarted until it gains less than 10⁻⁵.
+pub(super) fn climb(data: &Ordinates, form: &Form, start: &[f64], free: &[usize]) -> Option<Fit> {
+    let bounds = bounds(data, form, start);
+    let mut at = start.to_vec();
+    for i in free {
+        at[*i] = at[*i].clamp(bounds[*i].0, bounds[*i].1);
+    }
+    let held = Held::new(data, form, &at, free);
+    let mut best = objective(data, form, &at, &held, None);
+    for _ in 0..8 {
+        if free.is_empty() {
+            break;
+        }
+        let information = information(data, form, &at, &held);
+        let scale: Vec<f64> = free.iter().map(|i| 1.0 / information[(*i, *i)].sqrt().clamp(1.0, 1e8)).collect();
+        let place = |x: &[f64]| {
+            let mut logs = at.clone();
+            for ((i, x), s) in free.iter().zip(x).zip(&scale) {
+                logs[*i] = x * s;
+            }
+            logs
+        };
+        let f = |x: &[f64], gradient: Option<&mut [f64]>, _: &mut ()| {
+            let logs = place(x);
+            let value = match gradient {
+                Some(gradient) => {
+                    let mut whole = vec![0.0; logs.len()];
+                    let value = objective(data, form, &logs, &held, Some(&mut whole));
+                    for ((g, i), s) in gradient.iter_mut().zip(free).zip(&scale) {
+                        *g = whole[*i] * s;
+                    }
+                    value
+                }
+                None => objective(data, form, &logs, &held, None),
+            };
+            if value.is_finite() { value } else { f64::MAX.sqrt() }
+        };
+        let x: Vec<f64> = free.iter().zip(&scale).map(|(i, s)| at[*i] / s).collect();
+        let limits: Vec<(f64, f64)> =
+            free.iter().zip(&scale).map(|(i, s)| (bounds[*i].0 / s, bounds[*i].1 / s)).collect();
+        let none: [&dyn Func<()>; 0] = [];
+        let tolerances = StopTols { ftol_abs: 1e-6, ftol_rel: 1e-14, ..StopTols::default() };
+        let (x, value) = match minimize(f, &x, &limits, &none, (), 100, Some(tolerances)) {
+            Ok((_, x, value)) | Err((_, x, value)) => (x, value),
+        };
+        let next = place(&x);
+        if !value.is_finite() || next.iter().any(|v| !v.is_finite()) {
+            break;
+        }
+        let gain = best - value;
+        if gain > 0.0 {
+            best = value;
+            at = next;
+        }
+        if gain < 1e-5 {
+            break;
+        }
+    }
+    best.is_finite().then(|| finish(data, form, at, best, free, &bounds))
+}
+
+/// The same by all logarithms.
+pub(super) fn climb_all(data: &Ordinates, form: &Form, start: &[f64]) -> Option<Fit> {
+    climb(data, form, start, &(0..start.len()).collect::<Vec<_>>())
+}
+
+fn finish(data: &Ordinates, form: &Form, logs: Vec<f64>, value: f64, free: &[usize], bounds: &[(f64, f64)]) -> Fit {
+    let held = Held::new(data, form, &logs, free);
+    let mut gradient = vec![0.0; logs.len()];
+    objective(data, form, &logs, &held, Some(&mut gradient));
+    // at a bound the gradient may point outwards
+    let off = |i: &usize| logs[*i] > bounds[*i].0 + 1e-6 && logs[*i] < bounds[*i].1 - 1e-6;
+    let inside: Vec<usize> = free.iter().copied().filter(off).collect();
+    let information = information(data, form, &logs, &held);
+    let part = DMatrix::from_fn(inside.len(), inside.len(), |i, k| information[(inside[i], inside[k])]);
+    let g = DMatrix::from_fn(inside.len(), 1, |i, _| gradient[inside[i]]);
+    let decrement = nalgebra::Cholesky::new(part)
+        .map_or(f64::NAN, |c| (g.transpose() * c.solve(&g)).get(0).copied().unwrap_or(0.0));
+    let (slope, _) = slope(data, form, &spectrum(data, form, &logs, &held, false).total);
+    Fit { form: form.clone(), logs, slope, log_likelihood: -value, decrement }
+}

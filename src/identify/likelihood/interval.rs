@@ -6,8 +6,8 @@ use super::NORMAL_95;
 use super::ordinates::Ordinates;
 use super::whittle::{self, Fit};
 
-/// Standard deviation of a logarithm from which the likelihood is no parabola any more.
-const ROUGH: f64 = 0.08;
+/// Standard deviation of a logarithm from which the likelihood is no parabola any more; of drift parameters, and of others.
+const ROUGH: [f64; 2] = [0.03, 0.15];
 
 /// What the log says about one logarithm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,10 +36,12 @@ pub(super) fn precisions(data: &Ordinates, fit: &Fit) -> Vec<Precision> {
     (0..fit.logs.len())
         .map(|i| {
             let (sigma, bound) = (observed[i], expected[i]);
-            let [lower, upper] = if sigma < ROUGH {
+            let drift = fit.form.pieces()[fit.form.roles()[i].0].kind().is_drift();
+            let rough = if drift { ROUGH[0] } else { ROUGH[1] };
+            let [lower, upper] = if sigma < rough {
                 [-1.0, 1.0].map(|side| Some(fit.logs[i] + side * NORMAL_95 * sigma))
             } else {
-                let step = [sigma, bound].into_iter().filter(|s| s.is_finite()).fold(ROUGH, f64::max).min(2.0);
+                let step = [sigma, bound].into_iter().filter(|s| s.is_finite()).fold(rough, f64::max).min(2.0);
                 [(-1.0, bounds[i].0), (1.0, bounds[i].1)].map(|(side, end)| profile(data, fit, i, side * step, end))
             };
             Precision { sigma, bound, lower, upper }

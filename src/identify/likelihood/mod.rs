@@ -70,7 +70,12 @@ pub(super) fn identify(
     let chosen =
         if forced { 0 } else { fits.iter().position(|(fit, known)| unknown(fit, known).is_empty()).unwrap_or(0) };
     let Some((fit, known)) = fits.get(chosen) else {
-        return Err(failed(format!("{} samples say nothing about any noise term; use a longer log", rate.len())));
+        let line = matches!(choice, ModelChoice::Terms(kinds) if kinds.contains(&Kind::Oscillation));
+        return Err(failed(if line {
+            "no line stands out of the spectrum: leave osc out of --model".into()
+        } else {
+            format!("{} samples say nothing about any noise term; use a longer log", rate.len())
+        }));
     };
 
     let words = Words { data: &data, display };

@@ -9,7 +9,9 @@ use super::points::Points;
 use super::selection::{FIT_LEVEL, PENALTY, Table, score, search};
 use super::shape::{Role, Shape, document_name, in_allan_curve, roles, short_name};
 use super::weighted_fit::{Fit, tolerated};
-use super::{Candidate, Identified, IdentifyError, ModelChoice, bias, entry, usable};
+use super::{
+    Candidate, Identified, IdentifyError, LENGTHS_TO_TELL, ModelChoice, NORMAL_95, WIDEST_INTERVAL, bias, entry, usable,
+};
 use crate::allan::{self, AllanCurve, Deviation, TauGrid};
 use crate::noise::{Kind, NoiseModel, Term};
 use crate::params::{AxisParams, NotIdentified};
@@ -17,14 +19,8 @@ use crate::units::{Unit, digits};
 
 /// Points of the curve per decade of averaging time; denser ones add correlation, not information.
 const POINTS_PER_DECADE: usize = 5;
-/// Largest upper/lower ratio of a 95 % interval that still says something.
-const WIDEST_INTERVAL: f64 = 10.0;
-/// Two-sided 95 % point of the normal distribution.
-const NORMAL_95: f64 = 1.959_963_985;
 /// A model this close in score to the chosen one explains the log about as well.
 const CLOSE: f64 = 2.0 * PENALTY;
-/// A random walk and a Gauss-Markov process differ visibly in a log of this many correlation times.
-const LENGTHS_TO_TELL: f64 = 20.0;
 
 pub(super) fn identify(
     name: &str,

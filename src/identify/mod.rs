@@ -116,6 +116,13 @@ pub struct IdentifyError {
     pub message: String,
 }
 
+/// Largest upper/lower ratio of a 95 % interval that still says something.
+const WIDEST_INTERVAL: f64 = 10.0;
+/// Two-sided 95 % point of the normal distribution.
+const NORMAL_95: f64 = 1.959_963_985;
+/// A random walk and a Gauss-Markov process differ visibly in a log of this many correlation times.
+const LENGTHS_TO_TELL: f64 = 20.0;
+
 /// Fewest samples from which anything is identified: three averages of ten samples.
 const FEWEST_SAMPLES: usize = 30;
 

@@ -85,7 +85,7 @@ pub fn gate(course: &Course, runs: u64, alpha: f64, replicates: u64) -> Gate {
 /// False-alarm probability of a gate of [`REPLICATES`], from replicates that it has not seen.
 pub fn false_alarms(course: &Course, gate: &Gate, runs: u64) -> FalseAlarmRate {
     let drawn = drawn(course, runs, REPLICATES..REPLICATES + MEASURED);
-    let raw = |replicate: u64| drawn.iter().map(|axis| axis[replicate as usize].clone()).collect();
+    let raw = |replicate: u64| drawn.iter().filter_map(|axis| axis.get(replicate as usize).cloned()).collect();
     rate(course, gate, MEASURED, Method::Law, raw)
 }
 
@@ -97,12 +97,14 @@ pub fn false_alarms_of_experiments(
     replicates: u64,
     progress: &(dyn Fn(u64) + Sync),
 ) -> FalseAlarmRate {
-    let raw = |replicate: u64| {
-        let first = MAX_RUN + replicate * runs.next_multiple_of(4);
-        let totals = own.sums(first..first + runs, progress);
-        own.axes.iter().zip(&totals).map(|(axis, totals)| conclusion::raw_p_values(axis, totals, runs)).collect()
-    };
-    rate(own, gate, replicates, Method::Experiments, raw)
+    rate(own, gate, replicates, Method::Experiments, |replicate| whole_experiment(own, runs, replicate, progress))
+}
+
+/// Raw p-values of whole experiment number `number`, per axis; experiments share no runs.
+fn whole_experiment(course: &Course, runs: u64, number: u64, progress: &(dyn Fn(u64) + Sync)) -> Vec<Vec<f64>> {
+    let first = MAX_RUN + number * runs.next_multiple_of(4);
+    let totals = course.sums(first..first + runs, progress);
+    course.axes.iter().zip(&totals).map(|(axis, totals)| conclusion::raw_p_values(axis, totals, runs)).collect()
 }
 
 /// How often a wrong filter was caught.
@@ -123,16 +125,16 @@ pub fn caught_of_experiments(
     progress: &(dyn Fn(u64) + Sync),
 ) -> Caught {
     let failed = |experiment: &u64| {
-        let first = MAX_RUN + experiment * runs.next_multiple_of(4);
-        let totals = course.sums(first..first + runs, progress);
-        let mut axes = course.axes.iter().zip(&totals).zip(gates);
-        axes.any(|((axis, totals), gate)| {
-            let raw = conclusion::raw_p_values(axis, totals, runs);
-            // a p-value that is not a number is no pass
-            gate.p_values(&raw).into_iter().any(|p| p.is_nan() || p <= critical)
-        })
+        let raw = whole_experiment(course, runs, *experiment, progress);
+        let mut axes = raw.iter().zip(gates);
+        axes.any(|(raw, gate)| gate.p_values(raw).into_iter().any(|p| rejected(p, critical)))
     };
     Caught { caught: (0..experiments).filter(failed).count() as u64, of: experiments }
+}
+
+/// A p-value that is not a number is no pass.
+fn rejected(p: f64, critical: f64) -> bool {
+    p.is_nan() || p <= critical
 }
 
 fn rate(
@@ -148,8 +150,7 @@ fn rate(
         let mut failed = false;
         for ((axis, raw), alone) in gate.axes.iter().zip(raw(replicate)).zip(&mut alone) {
             for (p, count) in axis.p_values(&raw).into_iter().zip(alone) {
-                // a p-value that is not a number is no pass
-                let rejected = p.is_nan() || p <= gate.critical;
+                let rejected = rejected(p, gate.critical);
                 failed |= rejected;
                 count[0] += u64::from(p <= gate.alpha);
                 count[1] += u64::from(rejected);

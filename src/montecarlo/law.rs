@@ -63,7 +63,7 @@ pub(super) struct Drawn {
 }
 
 impl Law {
-    /// `None` when there is nothing to draw (fewer than two runs).
+    /// `None` when there is nothing to draw: no run, or a measurement without updates.
     pub(super) fn new(axis: &AxisCourse, runs: u64) -> Option<Law> {
         let n = axis.gains.states;
         let scale: Vec<f64> = (0..n)

@@ -16,22 +16,6 @@ impl Grid {
         let (sin, cos) = frequency_hz.iter().map(|f| (std::f64::consts::PI * f * dt).sin_cos()).unzip();
         Grid { frequency_hz, dt, sin, cos }
     }
-
-    pub fn len(&self) -> usize {
-        self.frequency_hz.len()
-    }
-
-    pub fn is_empty(&self) -> bool {
-        self.frequency_hz.is_empty()
-    }
-
-    pub fn dt(&self) -> f64 {
-        self.dt
-    }
-
-    pub fn frequency_hz(&self) -> &[f64] {
-        &self.frequency_hz
-    }
 }
 
 impl Term {

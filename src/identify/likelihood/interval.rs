@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::NORMAL_95;
+use super::super::NORMAL_95;
 use super::ordinates::Ordinates;
 use super::whittle::{self, Fit};
 

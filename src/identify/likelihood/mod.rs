@@ -9,9 +9,13 @@ mod interval;
 mod ordinates;
 mod whittle;
 
+use super::selection::FIT_LEVEL;
 use super::shape::Role;
 use super::shape::document_name;
-use super::{Candidate, Identified, IdentifyError, ModelChoice, Precision as Known, bias, entry, usable};
+use super::{
+    Candidate, Identified, IdentifyError, LENGTHS_TO_TELL, ModelChoice, NORMAL_95, Precision as Known, WIDEST_INTERVAL,
+    bias, entry, usable,
+};
 use crate::allan::{self, Deviation, TauGrid};
 use crate::noise::{Kind, NoiseModel, Term};
 use crate::numerics::distribution::kolmogorov_sf;
@@ -25,20 +29,12 @@ use whittle::Fit;
 
 /// Points of the shown Allan curve per decade of averaging time.
 const POINTS_PER_DECADE: usize = 5;
-/// Largest upper/lower ratio of a 95 % interval that still says something.
-const WIDEST_INTERVAL: f64 = 10.0;
-/// A fit below this probability is reported as bad.
-const FIT_LEVEL: f64 = 1e-3;
 /// A model this close in score to the chosen one explains the log about as well.
 const CLOSE: f64 = 6.0;
-/// A random walk and a Gauss-Markov process differ visibly in a log of this many correlation times.
-const LENGTHS_TO_TELL: f64 = 20.0;
 /// Candidates whose parameters are looked at, at most.
 const LOOKED_AT: usize = 12;
 /// Candidates that are tried on the part of the log they have not seen.
 const HELD_OUT: usize = 6;
-/// Two-sided 95 % point of the normal distribution.
-const NORMAL_95: f64 = 1.959_963_985;
 /// Share of the log to which the candidates are fitted for that.
 const FITTED_SHARE: f64 = 2.0 / 3.0;
 
@@ -310,7 +306,7 @@ impl Words<'_> {
             (None, None) => format!("the {span} s log bounds it on no side"),
         };
         // widths shrink like T^(−1/2)
-        let needed = self.data.span_s() * (2.0 * 1.96 * known.bound / WIDEST_INTERVAL.ln()).powi(2);
+        let needed = self.data.span_s() * (2.0 * NORMAL_95 * known.bound / WIDEST_INTERVAL.ln()).powi(2);
         NotIdentified {
             term: Words::name(fit, index),
             reason: format!("{reason}, model {}", fit.form.label()),

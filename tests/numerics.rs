@@ -280,3 +280,48 @@ mod reduce {
         assert!(Moments::default().variance().is_nan());
     }
 }
+
+mod quadratic_form {
+    use kfdesign::numerics::distribution::{chi_square_quantile, normal_sf};
+    use kfdesign::numerics::quadratic_form::QuadraticForm;
+
+    /// Equal weights make a chi-square law. The saddlepoint formula is off by some 1e-3 of the tail for four degrees of freedom and less for more
+    /// (Barndorff-Nielsen 1990: order 1/n^1.5); straight lines between saddlepoints add at most as much.
+    #[test]
+    fn equal_weights_are_chi_square() {
+        for (weights, freedom) in [(4, 5.0), (3, 40.0), (40, 1.0), (1, 1e5)] {
+            let form = QuadraticForm::new(&vec![2.5; weights]);
+            assert!(
+                (form.sum - 2.5 * weights as f64).abs() < 1e-12 && (form.squares - 6.25 * weights as f64).abs() < 1e-12
+            );
+            for p in [1e-8, 1e-4, 0.01, 0.3, 0.5, 0.9, 0.9999] {
+                let x = 2.5 * chi_square_quantile(p, weights as f64 * freedom);
+                let found = normal_sf(-form.z(x, freedom));
+                assert!((found / p - 1.0).abs() < 1e-3, "{weights} weights, {freedom}, p = {p}: {found}");
+            }
+        }
+    }
+
+    /// Two degrees of freedom each are exponentials of mean 2 w: P(X > x) = Σ_i e^{−x/(2 w_i)} Π_{j≠i} w_i/(w_i − w_j). So few degrees of freedom
+    /// are the worst case, and the far tail, where one weight alone counts, its worst place: 5 %.
+    #[test]
+    fn pairs_are_sums_of_exponentials() {
+        let weights: [f64; 4] = [3.0, 1.0, 0.5, 0.1];
+        let form = QuadraticForm::new(&[3.0, 0.0, 1.0, 0.5, -1e-18, 0.1]);
+        for x in [0.3, 1.0, 5.0, 20.0, 60.0, 120.0] {
+            let share = |w: f64| weights.iter().filter(|v| **v != w).map(|v| w / (w - v)).product::<f64>();
+            let above: f64 = weights.iter().map(|w| share(*w) * f64::exp(-x / (2.0 * w))).sum();
+            let z = form.z(x, 2.0);
+            assert!((normal_sf(z) / above - 1.0).abs() < 0.05, "{x}: {} for {above}", normal_sf(z));
+            // bisection to the rounding of ln x
+            assert!((form.quantile(z, 2.0) / x - 1.0).abs() < 1e-12, "{x}");
+        }
+    }
+
+    #[test]
+    fn a_form_of_nothing_has_no_law() {
+        let form = QuadraticForm::new(&[f64::NAN, -1.0]);
+        assert!(form.z(1.0, 3.0).is_nan() && form.quantile(0.0, 3.0).is_nan());
+        assert!(QuadraticForm::new(&[1.0]).z(f64::NAN, 1.0).is_nan());
+    }
+}

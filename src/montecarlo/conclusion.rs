@@ -63,6 +63,12 @@ impl<'a> Summary<'a> {
         regular.fold((0.0, 0), |(sum, count), (epoch, _)| (sum + self.nees(epoch), count + 1))
     }
 
+    /// Bounds of the average NEES, as a share of the number of components.
+    fn average_band(&self, p: f64) -> [f64; 2] {
+        let scale = self.nees_over_time().1 as f64 * self.size() as f64 * self.runs();
+        self.raw.nees_average_bounds(p).map(|sum| sum / scale)
+    }
+
     fn updates(&self, channel: usize) -> f64 {
         self.runs() * self.axis.channels[channel].updates as f64
     }
@@ -127,8 +133,8 @@ impl<'a> Summary<'a> {
             Kind::NeesAverage => {
                 let (sum, count) = self.nees_over_time();
                 let value = sum / (count as f64 * self.size() as f64 * n);
-                let bounds = band(at, self.raw.average_freedom());
-                (value, bounds, sentences::nees_average(value, bounds, self.raw.effective))
+                let bounds = self.average_band(at);
+                (value, bounds, sentences::nees_average(value, bounds, self.raw.effective()))
             }
             Kind::MeanError => {
                 let errors = self.mean_errors();
@@ -220,7 +226,7 @@ impl<'a> Summary<'a> {
         let (sum, count) = self.nees_over_time();
         let nees = level(&|kind| kind == Kind::Nees);
         let average = level(&|kind| kind == Kind::NeesAverage);
-        let [lower, upper] = band(average, self.raw.average_freedom());
+        let [lower, upper] = self.average_band(average);
         AxisOutcome {
             name: self.axis.name.clone(),
             nees: NeesCurve {
@@ -235,7 +241,7 @@ impl<'a> Summary<'a> {
                 expected: regular.iter().sum::<f64>() / regular.len() as f64,
                 lower,
                 upper,
-                effective_epochs: self.raw.effective,
+                effective_epochs: self.raw.effective(),
             },
             credibility: self.credibility(),
             errors: (0..self.size()).map(|component| self.component(component)).collect(),
@@ -254,7 +260,7 @@ impl<'a> Summary<'a> {
         let logs = regular.iter().map(|&e| self.totals.value(self.axis.layout.epoch(e)) / self.runs());
         let mean_log = logs.sum::<f64>() / regular.len() as f64;
         let moments: Vec<Vec<f64>> = regular.iter().map(|&e| self.moments(e)).collect();
-        credibility::credibility(mean_log, &moments, self.size(), self.runs() * self.raw.effective)
+        credibility::credibility(mean_log, &moments, self.size(), self.runs() * self.raw.effective())
     }
 
     fn component(&self, component: usize) -> Component {

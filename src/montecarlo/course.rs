@@ -1,5 +1,7 @@
 //! The course of an experiment: everything that does not depend on the random numbers, computed once for all runs.
 
+use std::sync::OnceLock;
+
 use nalgebra::DMatrix;
 
 use super::MonteCarloError;
@@ -10,6 +12,7 @@ use crate::filter::gains::Epoch;
 use crate::filter::{AxisDesign, FilterDesign, GainSequence, Judge};
 use crate::model::LinearModel;
 use crate::numerics::linalg::{cholesky_semidefinite, symmetrise};
+use crate::numerics::quadratic_form::QuadraticForm;
 use crate::tune::{TuneOptions, sensor_model};
 
 use super::spread::Spread;
@@ -46,6 +49,7 @@ pub struct AxisCourse {
     pub(super) nominal: Truth,
     pub(super) spread: Option<Spread>,
     pub(super) layout: Layout,
+    nees_over_time: OnceLock<QuadraticForm>,
 }
 
 /// How errors at one epoch are judged.
@@ -174,11 +178,17 @@ impl AxisCourse {
             nominal,
             spread,
             layout,
+            nees_over_time: OnceLock::new(),
         })
     }
 
     pub(super) fn layout(&self) -> &Layout {
         &self.layout
+    }
+
+    /// Law of the NEES summed over the evenly spread epochs of a run; computed when first asked for.
+    pub(super) fn nees_over_time(&self) -> &QuadraticForm {
+        self.nees_over_time.get_or_init(|| super::gate::nees_over_time(self))
     }
 }
 

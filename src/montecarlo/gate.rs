@@ -8,9 +8,13 @@
 
 use std::fmt;
 
+use nalgebra::DMatrix;
+
 use super::course::{AxisCourse, Channel};
 use crate::consistency::normalized::two_sided_p;
-use crate::numerics::distribution::{chi_square_sf, kolmogorov_sf, normal_sf};
+use crate::numerics::distribution::{chi_square_sf, kolmogorov_sf, normal_quantile, normal_sf};
+use crate::numerics::linalg::symmetric_eigenvalues;
+use crate::numerics::quadratic_form::QuadraticForm;
 
 /// Below this many drawn values the tail is extrapolated.
 const FEWEST: usize = 50;
@@ -100,13 +104,21 @@ impl fmt::Display for Kind {
 pub struct Raw<'a> {
     pub axis: &'a AxisCourse,
     pub runs: u64,
-    /// Independent NEES values that the average over the evenly spread epochs of one run is worth.
-    pub effective: f64,
+    /// Law of the NEES summed over the evenly spread epochs of a run.
+    over_time: &'a QuadraticForm,
 }
 
 impl<'a> Raw<'a> {
     pub fn new(axis: &'a AxisCourse, runs: u64) -> Raw<'a> {
-        Raw { axis, runs, effective: effective_epochs(axis) }
+        Raw { axis, runs, over_time: axis.nees_over_time() }
+    }
+
+    /// Independent NEES values that the average over the evenly spread epochs of one run is worth: E² r / Σ_jk |ρ_jk|².
+    ///
+    /// For one state and ρ_jk = λ^|j−k| this is n(1 − λ²)/(1 + λ²) (formula of Bar-Shalom, Li & Kirubarajan 2001, section 5.4, for a
+    /// Gauss-Markov error): a run of many epochs is worth few independent ones.
+    pub fn effective(&self) -> f64 {
+        self.over_time.sum.powi(2) / (self.over_time.squares * self.size())
     }
 
     /// Degrees of freedom of a NEES.
@@ -126,15 +138,15 @@ impl<'a> Raw<'a> {
         two_sided_p(sum, self.size() * self.runs as f64)
     }
 
-    /// `sum` over the runs and evenly spread epochs: scaled χ² with the mean's exact variance.
+    /// `sum` over the runs and evenly spread epochs: a quadratic form of correlated normal numbers.
     pub fn nees_average(&self, sum: f64) -> f64 {
-        let count = self.axis.epochs.iter().filter(|e| e.regular).count() as f64;
-        two_sided_p(sum * self.effective / count, self.average_freedom())
+        (2.0 * normal_sf(self.over_time.z(sum, self.runs as f64).abs())).min(1.0)
     }
 
-    /// Degrees of freedom of the average: r M n_eff.
-    pub fn average_freedom(&self) -> f64 {
-        self.size() * self.runs as f64 * self.effective
+    /// Sums of which [`nees_average`](Raw::nees_average) makes `p`.
+    pub fn nees_average_bounds(&self, p: f64) -> [f64; 2] {
+        let z = normal_quantile(1.0 - 0.5 * p);
+        [-z, z].map(|z| self.over_time.quantile(z, self.runs as f64))
     }
 
     /// Least upper-tail p over the epochs of M |ū|², χ²(r).
@@ -189,21 +201,24 @@ pub fn periodogram_distance(ordinates: &[f64]) -> (f64, usize) {
     (distance, at)
 }
 
-/// n_eff of the NEES averaged over the evenly spread epochs: E² r / Σ_jk |ρ_jk|², ρ_jk the correlation of the whitened errors u_j and u_k.
-///
-/// For one state ρ_jk = λ^|j−k| steps and this is n(1 − λ²)/(1 + λ²) (formula of Bar-Shalom, Li & Kirubarajan 2001, section 5.4, for a
-/// Gauss-Markov error): a run of many epochs is worth few independent ones.
-pub fn effective_epochs(axis: &AxisCourse) -> f64 {
-    let regular: Vec<usize> = (0..axis.epochs.len()).filter(|&i| axis.epochs[i].regular).collect();
-    let mut sum = axis.judge.size() as f64 * regular.len() as f64;
-    for &k in &regular {
-        let mut cross = &axis.gains.epochs[k].covariance * axis.epochs[k].of_estimate.transpose();
-        for j in k + 1..axis.epochs.len() {
-            cross = &axis.gains.epochs[j].transition * cross;
-            sum += 2.0 * (&axis.epochs[j].of_estimate * &cross).norm_squared();
+/// Law of the NEES summed over the evenly spread epochs of a run of a true filter: its weights are the eigenvalues of the correlation
+/// matrix of the whitened errors of all these epochs, blocks ρ_jk = E(u_j u_kᵀ).
+pub(super) fn nees_over_time(axis: &AxisCourse) -> QuadraticForm {
+    let size = axis.judge.size();
+    // evenly spread epochs follow those of the start
+    let first = axis.epochs.iter().position(|epoch| epoch.regular).unwrap_or(axis.epochs.len());
+    let count = axis.epochs.len() - first;
+    let mut correlation = DMatrix::identity(count * size, count * size);
+    for k in 0..count {
+        let mut cross = &axis.gains.epochs[first + k].covariance * axis.epochs[first + k].of_estimate.transpose();
+        for j in k + 1..count {
+            cross = &axis.gains.epochs[first + j].transition * cross;
+            let block = &axis.epochs[first + j].of_estimate * &cross;
+            correlation.view_mut((j * size, k * size), (size, size)).copy_from(&block);
         }
     }
-    (regular.len() as f64).powi(2) * axis.judge.size() as f64 / sum
+    correlation.fill_upper_triangle_with_lower_triangle();
+    QuadraticForm::new(&symmetric_eigenvalues(&correlation))
 }
 
 /// Law of a least p-value, from drawn ones.

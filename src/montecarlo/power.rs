@@ -166,7 +166,7 @@ impl<'a> Instrument<'a> {
 
     /// The same for another number of runs.
     pub fn with_runs(self, runs: u64) -> Instrument<'a> {
-        Instrument { raw: Raw { runs, ..self.raw }, ..self }
+        Instrument { raw: Raw::new(self.axis, runs), ..self }
     }
 
     /// What the filter does when the world is `truth`, which has the states of the filter.
@@ -208,8 +208,9 @@ impl<'a> Instrument<'a> {
                 let count = moments.len() as f64;
                 let mean = moments.iter().map(|m| m.0).sum::<f64>() / count;
                 let variance = moments.iter().map(|m| m.1).sum::<f64>() / count;
-                let worth = runs * self.raw.effective;
-                outside(p, size * worth, mean * worth, variance * worth)
+                let worth = runs * self.raw.effective();
+                let bounds = self.raw.nees_average_bounds(p).map(|sum| sum * worth / (count * runs));
+                beyond(bounds, mean * worth, variance * worth)
             }
             Kind::MeanError => best(&mut expectation.epochs.iter().filter_map(|e| {
                 let (mean, covariance) = e.whitened()?;
@@ -274,10 +275,12 @@ impl<'a> Instrument<'a> {
 
 /// Probability that a sum with this mean and variance leaves the two-sided χ²(`freedom`) bounds of level `p`; scaled χ².
 fn outside(p: f64, freedom: f64, mean: f64, variance: f64) -> f64 {
-    let (scale, own) = (variance / (2.0 * mean), 2.0 * mean * mean / variance);
-    let lower = chi_square_quantile(0.5 * p, freedom);
-    let upper = chi_square_quantile(1.0 - 0.5 * p, freedom);
-    chi_square_cdf(lower / scale, own) + chi_square_sf(upper / scale, own)
+    beyond([0.5 * p, 1.0 - 0.5 * p].map(|p| chi_square_quantile(p, freedom)), mean, variance)
+}
+
+/// Probability that a sum of squares with this mean and variance is outside the bounds.
+fn beyond([lower, upper]: [f64; 2], mean: f64, variance: f64) -> f64 {
+    chi_square_cdf(lower * 2.0 * mean / variance, 2.0 * mean * mean / variance) + above(upper, mean, variance)
 }
 
 /// Probability that a sum of squares with this mean and variance is above `bound`.

@@ -3,6 +3,7 @@
 pub mod distribution;
 pub mod exact_sum;
 pub mod linalg;
+pub mod quadratic_form;
 pub mod random;
 pub mod reduce;
 pub mod riccati;

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector, RowDVector};
 
 use super::Kalman;
+use super::transition::SparseTransition;
 use crate::model::LinearModel;
 
 /// Gains, innovation weights and covariances of a filter from its first measurement on.
@@ -51,14 +52,19 @@ impl GainSequence {
         };
         let rows: Vec<RowDVector<f64>> = model.h.row_iter().map(|row| row.into_owned()).collect();
         let mut filter = Kalman::new(model);
+        let sparse = SparseTransition::new(&model.f);
         let mut transition = DMatrix::identity(n, n);
         let mut advanced = transition.clone();
         let mut gain = DVector::zeros(n);
+        let mut seen = RowDVector::zeros(n);
         let mut wanted = epochs.iter().copied().peekable();
         for step in 0..steps {
             if step > 0 {
                 filter.predict();
-                model.f.mul_to(&transition, &mut advanced);
+                match &sparse {
+                    Some(sparse) => sparse.times(transition.as_slice(), advanced.as_mut_slice()),
+                    None => model.f.mul_to(&transition, &mut advanced),
+                }
                 std::mem::swap(&mut transition, &mut advanced);
             }
             for (i, h) in rows.iter().enumerate() {
@@ -71,8 +77,8 @@ impl GainSequence {
                 filter.p.mul_to(&h.transpose(), &mut gain);
                 gain /= model.r[(i, i)];
                 sequence.gains.extend(gain.iter());
-                let seen = h * &transition;
-                transition -= &gain * seen;
+                h.mul_to(&transition, &mut seen);
+                transition.ger(-1.0, &gain, &seen.transpose(), 1.0);
             }
             if wanted.next_if_eq(&step).is_some() {
                 sequence.epochs.push(Epoch { step, covariance: filter.p.clone(), transition: transition.clone() });

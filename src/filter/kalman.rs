@@ -4,6 +4,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::transition::SparseTransition;
 use crate::model::LinearModel;
 
 /// One scalar-measurement update's results.
@@ -29,6 +30,7 @@ pub struct Kalman {
     pub x: DVector<f64>,
     pub p: DMatrix<f64>,
     f: DMatrix<f64>,
+    sparse: Option<SparseTransition>,
     /// Hᵀ, so that the row of one measurement is contiguous.
     h_columns: DMatrix<f64>,
     q: DMatrix<f64>,
@@ -64,6 +66,7 @@ impl Kalman {
             x: model.x0.clone(),
             p: model.p0.clone(),
             f: model.f.clone(),
+            sparse: SparseTransition::new(&model.f),
             h_columns: model.h.transpose(),
             q: model.q.clone(),
             r: model.r.diagonal().iter().copied().collect(),
@@ -82,7 +85,10 @@ impl Kalman {
         let Scratch { vector, matrix, .. } = &mut self.scratch;
         let (f, q) = (self.f.as_slice(), self.q.as_slice());
         let (x, p) = (self.x.as_mut_slice(), self.p.as_mut_slice());
-        for_size!(x.len(), predict_kernel(f, q, x, p, vector, matrix));
+        match &self.sparse {
+            Some(sparse) => sparse.predict(q, x, p, vector, matrix),
+            None => for_size!(x.len(), predict_kernel(f, q, x, p, vector, matrix)),
+        }
     }
 
     /// n predictions with no measurement between (a gap); cost grows with log n.

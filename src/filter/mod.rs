@@ -23,6 +23,7 @@ pub mod mismatch;
 mod reading;
 pub(crate) mod rows;
 pub mod steady_state;
+mod transition;
 
 pub use document::{AxisDesign, FilterDesign, FilterError};
 pub use gains::GainSequence;

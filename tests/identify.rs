@@ -525,7 +525,7 @@ fn command_writes_what_the_library_finds() {
     let unit = Unit::parse("deg/s").unwrap();
     for (i, axis) in params.axes.iter().enumerate() {
         let rate = if i == 1 { &axes[1][1001..] } else { &axes[i][..] };
-        let expected = identify_axis(&axis.name, rate, 0.1, &unit, Method::Allan, &ModelChoice::Auto).unwrap();
+        let expected = identify_axis(&axis.name, rate, 0.1, &unit, Method::Likelihood, &ModelChoice::Auto).unwrap();
         assert_eq!(*axis, Params::from_json(&bench.read("params.json"), "p").unwrap().axes[i]);
         assert_eq!(axis.terms.len(), expected.params.terms.len());
         for (a, b) in axis.noise().terms.iter().zip(&expected.model.terms) {
@@ -539,7 +539,7 @@ fn command_writes_what_the_library_finds() {
         );
     }
     let source = params.source.unwrap();
-    assert_eq!((source.method.as_deref(), source.samples), (Some("allan"), Some(3000)));
+    assert_eq!((source.method.as_deref(), source.samples), (Some("likelihood"), Some(3000)));
     assert_eq!(source.log.as_deref(), Some("log.csv"));
     assert_eq!(source.sha256.unwrap().len(), 64);
     assert_eq!(document["axes"][1]["samples"], 1999);
@@ -586,7 +586,8 @@ fn command_shows_tables_and_refuses_what_it_must() {
 fn measured_gyro_has_its_known_density() {
     let Some(path) = measured("static/SMAC-Group_imudata/adis16405_recording1.csv.gz") else { return };
     let bench = Bench::new();
-    let command = format!("identify {} --rate 100 --sensor gyro --model white+flicker+rrw --json", path.display());
+    let command =
+        format!("identify {} --rate 100 --sensor gyro --method allan --model white+flicker+rrw --json", path.display());
     let document: serde_json::Value = serde_json::from_str(&bench.ok(&command)).unwrap();
     for (axis, known) in [0.0409, 0.0430, 0.0387].into_iter().enumerate() {
         let density = document["params"]["axes"][axis]["white"]["density"]["value"].as_f64().unwrap();

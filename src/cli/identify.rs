@@ -37,7 +37,7 @@ pub struct Args {
     #[arg(short, long, value_name = "FILE.json")]
     output: Option<PathBuf>,
     /// How parameters are taken from the log
-    #[arg(long, value_enum, default_value_t = MethodArg::Allan)]
+    #[arg(long, value_enum, default_value_t = MethodArg::Likelihood)]
     method: MethodArg,
     /// Terms of the model: auto, or white+gm, white+rrw … (terms: white, gm (up to three), rrw, flicker, quantization, ramp; for likelihood
     /// also osc and ma)

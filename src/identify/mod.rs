@@ -1,7 +1,6 @@
-//! Logs to noise parameters (floor 4): the paper's graphical recipe and the weighted Allan fit.
+//! Logs to noise parameters (floor 4): maximum likelihood, the weighted Allan fit, the paper's graphical recipe.
 //!
-//! One file per method; what they share is here. Likelihood methods, which also give the Cramér-Rao bound, get their own
-//! file and a variant of [`Method`].
+//! One file or folder per method, one variant of [`Method`] each; what they share is here.
 
 pub mod allan_fit;
 pub mod graphical;

@@ -342,6 +342,41 @@ fn parameters_that_cannot_be_used() {
     ]);
 }
 
+#[test]
+fn plans_that_cannot_be_made() {
+    fn row<'a>(flags: &'a str, words: &'a [&'a str]) -> Row<'a> {
+        (flags, "params.json", params("x", "x"), flags, words)
+    }
+    let good = "plan params.json --parameter white.density --precision 10% -o out.json";
+    let rate = params("\"sample_rate\"", "\"sample_rates\"");
+    assert_refused(vec![
+        ("missing file", "", vec![], good, &["params.json: cannot read"]),
+        ("no sample rate", "params.json", rate, good, &["params.json", "sample_rate"]),
+        row("plan params.json --precision 10%", &["--parameter"]),
+        row("plan params.json --parameter white.density", &["--precision"]),
+        row(
+            "plan params.json --parameter white.std_dev --precision 10% -o out.json",
+            &[
+                "--parameter white.std_dev: params.json has no such parameter; it has white.density, gauss_markov.std_dev",
+            ],
+        ),
+        row(
+            "plan params.json --parameter white.density --precision 10% --axis w",
+            &["--axis w: params.json has no such axis; it has"],
+        ),
+        row(
+            "plan params.json --parameter white.density --precision 10",
+            &["--precision 10: expected a share above 0 and at most 1, such as 10% or 0.1"],
+        ),
+        row("plan params.json --parameter white.density --precision ten", &["--precision ten: expected"]),
+        row("plan params.json --parameter white.density --precision 0%", &["--precision 0%: expected"]),
+        row("plan params.json --parameter white.density --precision=-5%", &["--precision -5%: expected"]),
+        row("plan params.json --parameter white.density --precision nan", &["--precision nan: expected"]),
+        row("plan params.json --parameter white.density --precision 10% --rate 0", &["--rate 0: expected a positive"]),
+        row("plan params.json --parameter white.density --precision 10% -o params.json", &["params.json", "input"]),
+    ]);
+}
+
 /// filter.json of the sound parameters with one change made to its document, and a log beside it.
 fn filter(change: impl Fn(&mut serde_json::Value)) -> Vec<u8> {
     let bench = Bench::new();

@@ -1,6 +1,7 @@
 //! Logs to noise parameters: recovery of known truth, honesty about what a log cannot tell, the paper's recipe.
 
 mod likelihood;
+mod plan;
 
 use std::time::Instant;
 

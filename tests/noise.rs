@@ -5,6 +5,7 @@ mod vectors;
 
 mod average;
 mod line;
+mod thinned;
 
 use kfdesign::noise::Term;
 use kfdesign::numerics::random::{StreamId, stream};

@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::Status;
 use super::allan::AxisCurve;
 use super::log_flags::{LogFlags, print_check};
-use super::output::{digits, print_json, print_text, progress, table};
+use super::output::{digits, duration, print_json, print_text, progress, table};
 use super::stretch::{Stretch, stretches};
 use crate::export::atomic;
 use crate::identify::graphical::Step;
@@ -288,15 +288,6 @@ fn headline(axis: &Axis) -> String {
             format!("{name}: {} from {samples} samples ({span}); fit p = {p}{used}", chosen.model)
         }
         None => format!("{}: the graphical recipe on {samples} samples ({span})", found.params.name),
-    }
-}
-
-/// Seconds below two minutes, minutes below two hours, else hours.
-fn duration(seconds: f64) -> String {
-    match seconds {
-        s if s < 120.0 => format!("{} s", digits(s)),
-        s if s < 7200.0 => format!("{} min", digits(s / 60.0)),
-        s => format!("{} h", digits(s / 3600.0)),
     }
 }
 

@@ -11,6 +11,7 @@ pub mod identify;
 pub mod log_flags;
 pub mod montecarlo;
 pub mod output;
+pub mod plan;
 pub mod replay;
 pub mod schema;
 pub mod simulate;
@@ -47,6 +48,7 @@ pub struct Cli {
 enum Command {
     Allan(allan::Args),
     Identify(identify::Args),
+    Plan(plan::Args),
     Simulate(simulate::Args),
     Tune(tune::Args),
     Replay(replay::Args),
@@ -72,6 +74,7 @@ pub fn main() -> ExitCode {
     let result = match cli.command {
         Command::Allan(args) => allan::run(&args),
         Command::Identify(args) => identify::run(&args),
+        Command::Plan(args) => plan::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Tune(args) => tune::run(&args),
         Command::Replay(args) => replay::run(&args),

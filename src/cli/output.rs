@@ -29,6 +29,16 @@ pub fn is_broken_pipe(error: &anyhow::Error) -> bool {
         .any(|e| e.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe))
 }
 
+/// Seconds below two minutes, minutes below two hours, hours below a thousand of them, else days.
+pub fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 120.0 => format!("{} s", digits(s)),
+        s if s < 7200.0 => format!("{} min", digits(s / 60.0)),
+        s if s < 3.6e6 => format!("{} h", digits(s / 3600.0)),
+        s => format!("{} days", digits(s / 86_400.0)),
+    }
+}
+
 /// A progress bar on stderr: only on a terminal, and only for work that lasts over a second.
 pub fn progress(total: u64, what: &'static str) -> ProgressBar {
     let bar = ProgressBar::new(total);

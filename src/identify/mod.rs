@@ -10,6 +10,7 @@ mod selection;
 mod shape;
 mod weighted_fit;
 
+pub use likelihood::plan;
 use schemars::JsonSchema;
 use serde::Serialize;
 

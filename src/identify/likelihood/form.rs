@@ -54,6 +54,22 @@ impl Piece {
         })
     }
 
+    /// The piece that a process is, with its values; the slope of a ramp is none of them.
+    pub(super) fn of(term: &Term) -> (Piece, Vec<f64>) {
+        match *term {
+            Term::White { density } => (Piece::White, vec![density]),
+            Term::MovingAverage { density, samples } => (Piece::MovingAverage(samples), vec![density]),
+            Term::Quantization { coefficient } => (Piece::Quantization, vec![coefficient]),
+            Term::Oscillation { std_dev, frequency_hz, correlation_time } => {
+                (Piece::Oscillation, vec![std_dev, frequency_hz, correlation_time])
+            }
+            Term::BiasInstability { coefficient } => (Piece::Flicker, vec![coefficient]),
+            Term::GaussMarkov { std_dev, correlation_time } => (Piece::GaussMarkov, vec![std_dev, correlation_time]),
+            Term::RateRandomWalk { density } => (Piece::RandomWalk, vec![density]),
+            Term::RateRamp { .. } => (Piece::Ramp, vec![]),
+        }
+    }
+
     /// In `--model`.
     fn short_name(self) -> String {
         match self {

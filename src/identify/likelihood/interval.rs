@@ -50,18 +50,22 @@ pub(super) fn precisions(data: &Ordinates, fit: &Fit) -> Vec<Precision> {
 }
 
 /// Standard deviations that belong to an information matrix.
-pub(super) fn deviations(information: DMatrix<f64>) -> Vec<f64> {
+fn deviations(information: DMatrix<f64>) -> Vec<f64> {
+    let p = information.nrows();
+    match covariance(&information) {
+        Some(covariance) => (0..p).map(|i| covariance[(i, i)].max(0.0).sqrt()).collect(),
+        None => vec![f64::INFINITY; p],
+    }
+}
+
+/// The inverse of an information matrix; None where that is singular.
+pub(super) fn covariance(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let p = information.nrows();
     // scaled to unit diagonal: logarithms of a frequency and of a coefficient differ by many orders
     let scale: Vec<f64> = (0..p).map(|i| information[(i, i)].abs().sqrt().max(1e-300)).collect();
     let scaled = DMatrix::from_fn(p, p, |i, k| information[(i, k)] / (scale[i] * scale[k]));
-    match nalgebra::Cholesky::new(scaled) {
-        Some(factor) => {
-            let inverse = factor.inverse();
-            (0..p).map(|i| inverse[(i, i)].max(0.0).sqrt() / scale[i]).collect()
-        }
-        None => vec![f64::INFINITY; p],
-    }
+    let inverse = nalgebra::Cholesky::new(scaled)?.inverse();
+    Some(DMatrix::from_fn(p, p, |i, k| inverse[(i, k)] / (scale[i] * scale[k])))
 }
 
 /// Where the likelihood, maximised over all other parameters, has fallen by χ²₁(0.95)/2 on the side of `step`; `end`: of the search.

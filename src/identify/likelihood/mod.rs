@@ -1,12 +1,13 @@
 //! Maximum likelihood on the cosine coefficients of the log: terms chosen, intervals given, the Cramér-Rao bound beside them.
 //!
 //! `ordinates` is the log in bins, `form` what a model consists of, `whittle` the likelihood and its maximum, `growth` the choice of the
-//! terms, `interval` what is known of each parameter.
+//! terms, `interval` what is known of each parameter, `plan` how long a log must be for that.
 
 mod form;
 mod growth;
 mod interval;
 mod ordinates;
+pub mod plan;
 mod whittle;
 
 use super::selection::FIT_LEVEL;
@@ -185,7 +186,7 @@ fn known_terms(data: &Ordinates, fit: &Fit, known: &[Precision]) -> Vec<Found> {
             }),
             Some(_) => {}
             None => {
-                let sigma = whittle::slope_sigma(data, fit);
+                let sigma = whittle::slope_sigma(data, &fit.form, &fit.logs);
                 let relative = (sigma / fit.slope).abs();
                 found.push(Found {
                     term: Term::RateRamp { slope: fit.slope },
@@ -220,10 +221,14 @@ fn known_precision(terms: &[Found]) -> Vec<Known> {
     all
 }
 
+/// `gauss_markov[1]`.
+fn term_name(kind: Kind, number: usize) -> String {
+    if number == 0 { document_name(kind).to_string() } else { format!("{}[{number}]", document_name(kind)) }
+}
+
 /// `gauss_markov[1].std_dev`.
 fn parameter_name(kind: Kind, number: usize, role: Role) -> String {
-    let place =
-        if number == 0 { document_name(kind).to_string() } else { format!("{}[{number}]", document_name(kind)) };
+    let place = term_name(kind, number);
     match role {
         Role::CorrelationTime => format!("{place}.correlation_time"),
         Role::Frequency => format!("{place}.frequency"),

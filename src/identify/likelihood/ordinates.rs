@@ -70,22 +70,37 @@ impl Ordinates {
             let line: Vec<f64> = (0..n).map(|k| (k as f64 - middle) * dt).collect();
             cosine_transform(&line).iter().map(|c| c * dt.sqrt()).collect()
         };
-        let mut bins = Vec::new();
-        let mut first = 0;
-        while first < power.len() {
-            let size = width(first + 1, step, &lines).min(power.len() - first);
+        let bin = |(first, size): (usize, usize)| {
             let (own, own_ramp) = (&power[first..first + size], &ramp[first..first + size]);
-            bins.push(Bin {
-                frequency_hz: (first as f64 + 1.0 + 0.5 * (size as f64 - 1.0)) * step,
+            Bin {
+                frequency_hz: middle(first, size) * step,
                 count: size as f64,
                 power: own.iter().map(|c| c * c).sum(),
                 with_ramp: own.iter().zip(own_ramp).map(|(c, r)| c * r).sum(),
                 ramp: own_ramp.iter().map(|r| r * r).sum(),
-            });
-            first += size;
-        }
+            }
+        };
+        let bins: Vec<Bin> = layout(power.len(), step, &lines).into_iter().map(bin).collect();
         let grid = Grid::new(bins.iter().map(|bin: &Bin| bin.frequency_hz).collect(), dt);
         Ordinates { bins, grid, lines, samples: n, dt }
+    }
+
+    /// What a log of so many samples would have before it is recorded: bins without power. `grid` is made of their frequencies.
+    ///
+    /// Coefficients of a ramp of slope 1: r_j = −√(2/n) dt cos(πj/2n)/(2 sin²(πj/2n)) for odd j, else 0 (summation by parts).
+    pub(super) fn expected(samples: usize, dt: f64, lines: &[Line], grid: impl Fn(&[f64]) -> Grid) -> Ordinates {
+        let step = 1.0 / (2.0 * samples as f64 * dt);
+        let bin = |(first, size): (usize, usize)| {
+            let number = middle(first, size);
+            let (sin, cos) = (std::f64::consts::FRAC_PI_2 * number / samples as f64).sin_cos();
+            // numbers from first + 1 to first + size
+            let odd = (first + size).div_ceil(2) - first.div_ceil(2);
+            let ramp = odd as f64 * dt.powi(3) * (2.0 / samples as f64) * (cos / (2.0 * sin * sin)).powi(2);
+            Bin { frequency_hz: number * step, count: size as f64, power: 0.0, with_ramp: 0.0, ramp }
+        };
+        let bins: Vec<Bin> = layout(samples.saturating_sub(1), step, lines).into_iter().map(bin).collect();
+        let grid = grid(&bins.iter().map(|bin| bin.frequency_hz).collect::<Vec<f64>>());
+        Ordinates { bins, grid, lines: lines.to_vec(), samples, dt }
     }
 
     /// Around a frequency: where bins are at most twice as wide as there, and how wide they are there, Hz.
@@ -103,6 +118,23 @@ impl Ordinates {
     pub(super) fn span_s(&self) -> f64 {
         self.samples as f64 * self.dt
     }
+}
+
+/// How many coefficients come before each bin, and how many are in it.
+fn layout(coefficients: usize, step: f64, lines: &[Line]) -> Vec<(usize, usize)> {
+    let mut bins = Vec::new();
+    let mut first = 0;
+    while first < coefficients {
+        let size = width(first + 1, step, lines).min(coefficients - first);
+        bins.push((first, size));
+        first += size;
+    }
+    bins
+}
+
+/// Mean number of the coefficients in a bin.
+fn middle(first: usize, size: usize) -> f64 {
+    first as f64 + 1.0 + 0.5 * (size as f64 - 1.0)
 }
 
 /// Coefficients in the bin that begins with number `j`.

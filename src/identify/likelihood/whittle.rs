@@ -193,8 +193,8 @@ pub(super) fn observed_information(data: &Ordinates, fit: &Fit) -> DMatrix<f64> 
 }
 
 /// Standard deviation of the slope of a ramp.
-pub(super) fn slope_sigma(data: &Ordinates, fit: &Fit) -> f64 {
-    slope(data, &fit.form, &fit.spectrum(data)).1
+pub(super) fn slope_sigma(data: &Ordinates, form: &Form, logs: &[f64]) -> f64 {
+    slope(data, form, &spectrum(data, form, logs, &Held::nothing(data, form), false).total).1
 }
 
 /// ln L of `form` at given parameters on other data.

@@ -2,6 +2,7 @@
 
 mod document;
 mod kalman;
+mod likelihood;
 mod mismatch;
 mod steady_state;
 

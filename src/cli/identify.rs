@@ -17,9 +17,12 @@ use super::output::{digits, duration, print_json, print_text, progress, table};
 use super::stretch::{Stretch, stretches};
 use crate::export::atomic;
 use crate::identify::graphical::Step;
-use crate::identify::{Candidate, Identified, Method, ModelChoice, Precision, identify_axis, parse_model};
+use crate::identify::{
+    Candidate, Identified, Method, ModelChoice, Precision, identify_axis, identify_logs, parse_model,
+};
+use crate::input::InputKind;
 use crate::params::{NotIdentified, Params, Source};
-use crate::signal::LogCheck;
+use crate::signal::{LogCheck, Recording};
 use crate::units::Quantity;
 
 /// Noise parameters from a log at rest, with intervals
@@ -31,8 +34,9 @@ use crate::units::Quantity;
     after_help = "Example: kfdesign identify static.csv --unit deg/s --rate 100 -o params.json --report identify.html"
 )]
 pub struct Args {
-    /// The log, sensor at rest: text, .gz or .npy
-    log: PathBuf,
+    /// The log, sensor at rest: text, .gz or .npy; several logs of the same sensor, one per start, also give its turn-on bias
+    #[arg(required = true, value_name = "LOG")]
+    logs: Vec<PathBuf>,
     /// The parameters: params.json
     #[arg(short, long, value_name = "FILE.json")]
     output: Option<PathBuf>,
@@ -76,6 +80,9 @@ impl MethodArg {
     }
 }
 
+/// Largest difference of the sample rates of logs of one sensor.
+const SAME_RATE: f64 = 0.005;
+
 /// What `identify --json` prints.
 #[derive(Debug, Serialize)]
 struct Document<'a> {
@@ -84,7 +91,9 @@ struct Document<'a> {
     /// As written with `-o`.
     params: &'a Params,
     axes: Vec<AxisDocument<'a>>,
-    log: &'a LogCheck,
+    log: Option<&'a LogCheck>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    further_logs: Vec<&'a LogCheck>,
 }
 
 /// How the parameters of one axis came about.
@@ -103,6 +112,9 @@ struct AxisDocument<'a> {
     /// Likelihood only.
     #[serde(skip_serializing_if = "<[Precision]>::is_empty")]
     precision: &'a [Precision],
+    /// Likelihood only: diffuse ln L of the samples in SI units, by a Kalman filter at these parameters.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    exact_log_likelihood: Option<f64>,
     steps: &'a [Step],
     warnings: &'a [String],
     allan: CurveDocument,
@@ -134,22 +146,30 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
             args.model
         );
     }
+    if args.logs.len() > 1 && args.method != MethodArg::Likelihood {
+        bail!("{} logs: only --method likelihood takes more than one", args.logs.len());
+    }
     for output in [&args.output, &args.report, &args.plot].into_iter().flatten() {
-        atomic::check_output(output, &args.log)?;
+        args.logs.iter().try_for_each(|log| atomic::check_output(output, log))?;
     }
     let options = args.reading.options()?;
-    let (recording, check) = crate::input::read(&args.log, &options)?;
-    print_check(&recording.name, &check);
+    let mut readings = Vec::with_capacity(args.logs.len());
+    for log in &args.logs {
+        let (recording, check) = crate::input::read(log, &options)?;
+        print_check(&recording.name, &check);
+        readings.push((recording, check));
+    }
+    let (recording, _) = &readings[0];
     let dt = recording.dt();
-    let parts = stretches(&recording, options.kind);
+    let parts = by_axis(&args.logs, &readings, options.kind)?;
     if parts.is_empty() {
-        bail!("{}: no axis to work on", args.log.display());
+        bail!("{}: no axis to work on", args.logs[0].display());
     }
     let bar = progress(parts.len() as u64, "identify");
     let axes: Vec<Axis> = parts
         .into_par_iter()
         .map(|part| {
-            let axis = identify(part, dt, args.method.method(), &choice, &check);
+            let axis = identify(part, dt, args.method.method(), &choice, &readings);
             bar.inc(1);
             axis
         })
@@ -157,8 +177,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     bar.finish_and_clear();
     for Axis { measured: AxisCurve { stretch, .. }, .. } in axes.iter().filter(|a| a.measured.stretch.left_out > 0) {
         eprintln!(
-            "  note: {}: the longest stretch without gaps and unusable samples is used: {} samples, {} left out",
+            "  note: {}: the longest stretch without gaps and unusable samples {}: {} samples, {} left out",
             stretch.name,
+            if args.method == MethodArg::Likelihood { "chooses the terms" } else { "is used" },
             stretch.rate.len(),
             stretch.left_out
         );
@@ -168,10 +189,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         sample_rate_hz: recording.sample_rate_hz,
         axes: axes.iter().map(|a| a.found.params.clone()).collect(),
         source: Some(Source {
-            log: Some(file_name(&args.log)),
-            sha256: recording.sha256.clone(),
-            samples: Some(check.samples),
-            span_s: Some(check.span_s),
+            log: Some(args.logs.iter().map(|log| file_name(log)).collect::<Vec<_>>().join(", ")),
+            sha256: recording.sha256.clone().filter(|_| readings.len() == 1),
+            samples: Some(readings.iter().map(|(_, check)| check.samples).sum()),
+            span_s: Some(readings.iter().map(|(_, check)| check.span_s).sum()),
             method: Some(args.method.method().name().into()),
             version: Some(env!("CARGO_PKG_VERSION").into()),
             note: None,
@@ -187,7 +208,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         atomic::write(path, sight::page(&params, &axes)?.as_bytes())?;
     }
     if args.json {
-        print_json(&document(&params, &axes, &check))?;
+        print_json(&document(&params, &axes, &readings))?;
     } else {
         let text: Vec<String> = axes.iter().map(|axis| text(axis, params.quantity)).collect();
         print_text(&text.join("\n"))?;
@@ -199,20 +220,67 @@ fn file_name(path: &Path) -> String {
     path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
 }
 
-fn identify(part: Stretch, dt: f64, method: Method, choice: &ModelChoice, check: &LogCheck) -> anyhow::Result<Axis> {
-    let mut found = identify_axis(&part.name, &part.rate, dt, &part.unit, method, choice)?;
+/// The stretches of each axis, one per log; the logs must be of one sensor.
+fn by_axis(logs: &[PathBuf], readings: &[(Recording, LogCheck)], kind: InputKind) -> anyhow::Result<Vec<Vec<Stretch>>> {
+    let (first, _) = &readings[0];
+    let mut all: Vec<Vec<Stretch>> = stretches(first, kind).into_iter().map(|part| vec![part]).collect();
+    for (log, (recording, _)) in logs.iter().zip(readings).skip(1) {
+        let differs = |what: &str, found: &str, expected: &str| {
+            anyhow::anyhow!(
+                "{}: {what} {found}, but {} has {expected}: logs of one sensor are needed",
+                log.display(),
+                logs[0].display()
+            )
+        };
+        if recording.quantity != first.quantity {
+            return Err(differs("quantity", recording.quantity.name(), first.quantity.name()));
+        }
+        let [rate, expected] = [recording, first].map(|r| r.sample_rate_hz);
+        if (rate / expected - 1.0).abs() > SAME_RATE {
+            return Err(differs("sample rate", &format!("{} Hz", digits(rate)), &format!("{} Hz", digits(expected))));
+        }
+        let further = stretches(recording, kind);
+        let names =
+            |parts: &mut dyn Iterator<Item = &Stretch>| parts.map(|p| p.name.clone()).collect::<Vec<_>>().join(", ");
+        let (own, known) = (names(&mut further.iter()), names(&mut all.iter().map(|parts| &parts[0])));
+        if own != known {
+            return Err(differs("axes", &own, &known));
+        }
+        all.iter_mut().zip(further).for_each(|(parts, part)| parts.push(part));
+    }
+    Ok(all)
+}
+
+/// `parts`: the stretches of one axis, one per log.
+fn identify(
+    mut parts: Vec<Stretch>,
+    dt: f64,
+    method: Method,
+    choice: &ModelChoice,
+    readings: &[(Recording, LogCheck)],
+) -> anyhow::Result<Axis> {
+    // the first of the longest
+    let longest = (0..parts.len()).rev().max_by_key(|i| parts[*i].rate.len()).unwrap_or(0);
+    let part = &parts[longest];
+    let mut found = if method == Method::Likelihood {
+        let logs: Vec<_> = parts.iter().map(Stretch::pieces).collect();
+        identify_logs(&part.name, &part.rate, &logs, dt, &part.unit, choice)?
+    } else {
+        identify_axis(&part.name, &part.rate, dt, &part.unit, method, choice)?
+    };
     let moves = |axis: &Option<String>| axis.as_ref().is_none_or(|name| *name == part.name);
-    if check.findings.iter().any(|f| f.kind == "motion" && moves(&f.axis)) {
+    if readings.iter().any(|(_, check)| check.findings.iter().any(|f| f.kind == "motion" && moves(&f.axis))) {
         found.warnings.push(
             "the log is not at rest all the time (see the log check): motion counts as drift here; cut it with --start/--end"
                 .into(),
         );
     }
+    let part = parts.swap_remove(longest);
     let measured = AxisCurve { stretch: part, curve: found.curve.clone(), fit: Ok(found.model.clone()) };
     Ok(Axis { measured, found })
 }
 
-fn document<'a>(params: &'a Params, axes: &'a [Axis], log: &'a LogCheck) -> Document<'a> {
+fn document<'a>(params: &'a Params, axes: &'a [Axis], readings: &'a [(Recording, LogCheck)]) -> Document<'a> {
     let axis = |axis: &'a Axis| {
         let Axis { measured, found } = axis;
         let points = &found.curve.points;
@@ -238,11 +306,14 @@ fn document<'a>(params: &'a Params, axes: &'a [Axis], log: &'a LogCheck) -> Docu
         fit_p_value: a.found.fit_p_value.is_finite().then_some(a.found.fit_p_value),
         candidates: &a.found.candidates,
         precision: &a.found.precision,
+        exact_log_likelihood: a.found.exact_log_likelihood,
         steps: &a.found.steps,
         warnings: &a.found.warnings,
         allan: axis(a),
     });
-    Document { format: "kfdesign-identify/1", params, axes: axes.collect(), log }
+    let mut logs = readings.iter().map(|(_, check)| check);
+    let log = logs.next();
+    Document { format: "kfdesign-identify/1", params, axes: axes.collect(), log, further_logs: logs.collect() }
 }
 
 const STEPS: [&str; 4] = ["step", "formula", "value", "unit"];

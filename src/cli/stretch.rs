@@ -3,8 +3,9 @@
 
 use std::ops::Range;
 
+use crate::filter;
 use crate::input::InputKind;
-use crate::signal::Recording;
+use crate::signal::{Gap, Recording};
 use crate::units::Unit;
 
 /// One axis, SI.
@@ -19,6 +20,19 @@ pub(super) struct Stretch {
     pub(super) phase: Option<Vec<f64>>,
     /// Samples of the log outside the stretch.
     pub(super) left_out: usize,
+    /// The whole log: how many samples are missing before, then samples, of which some may not be finite; empty where `rate` is all.
+    whole: Vec<(u64, Vec<f64>)>,
+}
+
+impl Stretch {
+    /// All of the log, piece by piece.
+    pub(super) fn pieces(&self) -> Vec<filter::likelihood::Stretch<'_>> {
+        let piece = |missing, samples| filter::likelihood::Stretch { missing, samples };
+        match &self.whole[..] {
+            [] => vec![piece(0, &self.rate)],
+            whole => whole.iter().map(|(missing, samples)| piece(*missing, samples)).collect(),
+        }
+    }
 }
 
 /// The stretches of all axes; increments are divided by the sample period, angles differenced and divided.
@@ -31,6 +45,7 @@ pub(super) fn stretches(recording: &Recording, kind: InputKind) -> Vec<Stretch> 
         .map(|axis| {
             let range = longest(&axis.values, &cuts);
             let left_out = axis.values.len() - range.len();
+            let whole = if left_out > 0 { pieces(&axis.values, &recording.gaps, kind, dt) } else { Vec::new() };
             let values = axis.values.get(range).unwrap_or_default();
             let (rate, phase) = match kind {
                 InputKind::Rate => (values.to_vec(), None),
@@ -40,9 +55,26 @@ pub(super) fn stretches(recording: &Recording, kind: InputKind) -> Vec<Stretch> 
                 }
             };
             let unit = if kind == InputKind::Rate { axis.unit.clone() } else { axis.unit.times_time(-2) };
-            Stretch { name: axis.name.clone(), unit, rate, phase, left_out }
+            Stretch { name: axis.name.clone(), unit, rate, phase, left_out, whole }
         })
         .collect()
+}
+
+/// The log between its gaps, as rate. A difference of angles over a gap is lost.
+fn pieces(values: &[f64], gaps: &[Gap], kind: InputKind, dt: f64) -> Vec<(u64, Vec<f64>)> {
+    let starts = std::iter::once((0, 0)).chain(gaps.iter().map(|gap| (gap.index, gap.missing)));
+    let ends = gaps.iter().map(|gap| gap.index).chain([values.len()]);
+    let lost = u64::from(kind == InputKind::Angle);
+    let pieces = starts.zip(ends).filter(|((start, _), end)| start < end).map(|((start, missing), end)| {
+        let own = &values[start..end];
+        let missing = if missing > 0 { missing + lost } else { 0 };
+        match kind {
+            InputKind::Rate => (missing, own.to_vec()),
+            InputKind::Increments => (missing, own.iter().map(|v| v / dt).collect()),
+            InputKind::Angle => (missing, own.windows(2).map(|pair| (pair[1] - pair[0]) / dt).collect()),
+        }
+    });
+    pieces.collect()
 }
 
 /// Longest run of finite values that does not reach over a cut (index of the first sample after it).
@@ -66,6 +98,17 @@ fn longest(values: &[f64], cuts: &[usize]) -> Range<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pieces_are_what_lies_between_gaps() {
+        let gaps = [Gap { index: 2, missing: 7 }, Gap { index: 3, missing: 1 }];
+        let values = [1.0, 3.0, 4.0, 8.0, 9.0];
+        let of = |kind| pieces(&values, &gaps, kind, 0.5);
+        assert_eq!(of(InputKind::Rate), [(0, vec![1.0, 3.0]), (7, vec![4.0]), (1, vec![8.0, 9.0])]);
+        assert_eq!(of(InputKind::Increments), [(0, vec![2.0, 6.0]), (7, vec![8.0]), (1, vec![16.0, 18.0])]);
+        assert_eq!(of(InputKind::Angle), [(0, vec![4.0]), (8, vec![]), (2, vec![2.0])]);
+        assert_eq!(pieces(&values, &[Gap { index: 0, missing: 3 }], InputKind::Rate, 0.5), [(3, values.to_vec())]);
+    }
 
     #[test]
     fn longest_run_ends_at_gaps_and_nan() {

@@ -19,6 +19,7 @@ pub mod document;
 pub mod gains;
 pub mod judge;
 pub mod kalman;
+pub mod likelihood;
 pub mod mismatch;
 mod reading;
 pub(crate) mod rows;

@@ -83,6 +83,7 @@ pub(super) fn identify(
         model,
         candidates: candidates(&table, fit),
         precision: vec![],
+        exact_log_likelihood: None,
         not_identified,
         warnings,
         steps: vec![],

@@ -112,6 +112,7 @@ pub(super) fn identify(name: &str, rate: &[f64], dt: f64, display: &Unit) -> Res
         curve,
         candidates: vec![],
         precision: vec![],
+        exact_log_likelihood: None,
         not_identified,
         warnings,
         steps,

@@ -15,6 +15,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::allan::AllanCurve;
+use crate::filter::likelihood::Stretch;
 use crate::noise::{Kind, NoiseModel, Term};
 use crate::numerics::reduce::mean;
 use nalgebra::Complex;
@@ -99,6 +100,8 @@ pub struct Identified {
     pub candidates: Vec<Candidate>,
     /// Likelihood only.
     pub precision: Vec<Precision>,
+    /// Diffuse ln L of the samples (SI) at these parameters, by a Kalman filter; `None` where it would take too long.
+    pub exact_log_likelihood: Option<f64>,
     pub not_identified: Vec<NotIdentified>,
     /// Sentences for a person.
     pub warnings: Vec<String>,
@@ -140,8 +143,25 @@ pub fn identify_axis(
     match method {
         Method::Graphical => graphical::identify(name, rate, dt, display),
         Method::Allan => allan_fit::identify(name, rate, dt, display, choice),
-        Method::Likelihood => likelihood::identify(name, rate, dt, display, choice),
+        Method::Likelihood => {
+            let whole = [vec![Stretch { missing: 0, samples: rate }]];
+            likelihood::identify(name, rate, &whole, dt, display, choice)
+        }
     }
+}
+
+/// The same by maximum likelihood from logs with gaps, or from several logs of one sensor, each with its own bias.
+///
+/// `rate` is the longest stretch without gaps, on which the terms are chosen; `logs` are all of them, stretch by stretch.
+pub fn identify_logs(
+    name: &str,
+    rate: &[f64],
+    logs: &[Vec<Stretch<'_>>],
+    dt: f64,
+    display: &Unit,
+    choice: &ModelChoice,
+) -> Result<Identified, IdentifyError> {
+    likelihood::identify(name, rate, logs, dt, display, choice)
 }
 
 /// Parses `auto` or `white+gm+…`; white noise is part of every model.

@@ -16,7 +16,10 @@ pub(super) struct Shown {
 /// Values with intervals; of the likelihood method with standard deviations beside their bound.
 pub(super) fn parameters(axis: &Axis, quantity: Quantity) -> Shown {
     let found = &axis.found;
-    let bias = found.params.bias.iter().map(|bias| row("bias (mean of this log)", bias, String::new())).collect();
+    let turn_on = found.params.turn_on_bias.as_ref();
+    let caption = if turn_on.is_some() { "bias (mean of all starts)" } else { "bias (mean of this log)" };
+    let bias = found.params.bias.iter().map(|bias| row(caption, bias, String::new()));
+    let bias = bias.chain(turn_on.map(|spread| row("turn-on bias sigma", spread, String::new()))).collect();
     let (bias, mut rows): (Vec<Vec<String>>, _) = (bias, term_rows(&found.params.terms, quantity));
     if found.precision.is_empty() {
         let header = &["parameter", "value", "95 % from", "to", "unit", "also"];

@@ -50,7 +50,7 @@ pub(super) fn precisions(data: &Ordinates, fit: &Fit) -> Vec<Precision> {
 }
 
 /// Standard deviations that belong to an information matrix.
-fn deviations(information: DMatrix<f64>) -> Vec<f64> {
+pub(super) fn deviations(information: DMatrix<f64>) -> Vec<f64> {
     let p = information.nrows();
     match covariance(&information) {
         Some(covariance) => (0..p).map(|i| covariance[(i, i)].max(0.0).sqrt()).collect(),

@@ -3,11 +3,13 @@
 //! `ordinates` is the log in bins, `form` what a model consists of, `whittle` the likelihood and its maximum, `growth` the choice of the
 //! terms, `interval` what is known of each parameter, `plan` how long a log must be for that.
 
+mod exact;
 mod form;
 mod growth;
 mod interval;
 mod ordinates;
 pub mod plan;
+mod turn_on;
 mod whittle;
 
 use super::selection::FIT_LEVEL;
@@ -18,10 +20,12 @@ use super::{
     bias, entry, usable,
 };
 use crate::allan::{self, Deviation, TauGrid};
+use crate::filter::likelihood::Stretch;
 use crate::noise::{Kind, NoiseModel, Term};
 use crate::numerics::distribution::kolmogorov_sf;
 use crate::params::{AxisParams, NotIdentified};
 use crate::units::{Unit, digits};
+use exact::{Exact, Refined};
 use form::{Form, Piece};
 use growth::score;
 use interval::{Precision, precisions};
@@ -36,12 +40,16 @@ const CLOSE: f64 = 6.0;
 const LOOKED_AT: usize = 12;
 /// Candidates that are tried on the part of the log they have not seen.
 const HELD_OUT: usize = 6;
+/// Standard deviation of a logarithm below which second differences of the exact likelihood give its interval.
+const PARABOLA: f64 = 0.3;
 /// Share of the log to which the candidates are fitted for that.
 const FITTED_SHARE: f64 = 2.0 / 3.0;
 
+/// `rate`: the longest stretch, on which terms are chosen; `logs`: all of it, for the exact likelihood.
 pub(super) fn identify(
     name: &str,
     rate: &[f64],
+    logs: &[Vec<Stretch<'_>>],
     dt: f64,
     display: &Unit,
     choice: &ModelChoice,
@@ -66,7 +74,7 @@ pub(super) fn identify(
     fits.sort_by(|a, b| score(&a.0, &data).total_cmp(&score(&b.0, &data)));
     let chosen =
         if forced { 0 } else { fits.iter().position(|(fit, known)| unknown(fit, known).is_empty()).unwrap_or(0) };
-    let Some((fit, known)) = fits.get(chosen) else {
+    let Some((on_cosines, known)) = fits.get(chosen) else {
         let line = matches!(choice, ModelChoice::Terms(kinds) if kinds.contains(&Kind::Oscillation));
         return Err(failed(if line {
             "no line stands out of the spectrum: leave osc out of --model".into()
@@ -74,6 +82,12 @@ pub(super) fn identify(
             format!("{} samples say nothing about any noise term; use a longer log", rate.len())
         }));
     };
+
+    let refined = Exact::new(&data, on_cosines, logs).and_then(|exact| exact.refine(on_cosines));
+    let fit =
+        &refined.as_ref().map_or_else(|| on_cosines.clone(), |r| Fit { logs: r.logs.clone(), ..on_cosines.clone() });
+    let known =
+        &refined.as_ref().map_or_else(|| known.clone(), |refined| moved(on_cosines, known, refined, &data, logs));
 
     let words = Words { data: &data, display };
     let terms = known_terms(&data, fit, known);
@@ -103,15 +117,20 @@ pub(super) fn identify(
         chosen: i == chosen,
     };
     let candidates = fits.iter().enumerate().map(candidate).collect();
+    let (bias, turn_on_bias) = match refined.as_ref().and_then(|refined| turn_on::spread(&refined.biases)) {
+        Some(spread) => spread.measured(display),
+        None => (bias(rate, dt, &model, display), None),
+    };
     Ok(Identified {
         params: AxisParams {
             name: name.into(),
-            bias: Some(bias(rate, dt, &model, display)),
-            turn_on_bias: None,
+            bias: Some(bias),
+            turn_on_bias,
             terms: terms.iter().map(|found| entry(&found.term, &found.intervals, display)).collect::<Result<_, _>>()?,
             not_identified: not_identified.clone(),
         },
         precision: known_precision(&terms),
+        exact_log_likelihood: refined.map(|refined| refined.log_likelihood),
         warnings: words.warnings(fit, fit_p_value),
         model,
         candidates,
@@ -121,6 +140,30 @@ pub(super) fn identify(
         first_tau_s: None,
         curve,
     })
+}
+
+/// What is known of each logarithm at the maximum of the exact likelihood: intervals move along, and shrink where there was more to be seen.
+fn moved(
+    before: &Fit,
+    known: &[Precision],
+    refined: &Refined,
+    data: &Ordinates,
+    logs: &[Vec<Stretch<'_>>],
+) -> Vec<Precision> {
+    let samples: usize = logs.iter().flatten().map(|part| part.samples.len()).sum();
+    let more = samples as f64 / data.samples as f64;
+    let sigmas = refined.information.clone().map(interval::deviations);
+    let of = |(i, old): (usize, &Precision)| {
+        let (from, to) = (before.logs[i], refined.logs[i]);
+        let sigma = sigmas.as_ref().map_or(old.sigma, |all| all[i]);
+        let shrunk = if old.sigma.is_finite() { (sigma / old.sigma).min(1.0) } else { 1.0 };
+        let limit = |old: Option<f64>, side: f64| match old {
+            _ if sigmas.is_some() && sigma < PARABOLA => Some(to + side * NORMAL_95 * sigma),
+            old => old.map(|old| to + (old - from) * shrunk),
+        };
+        Precision { sigma, bound: old.bound / more.sqrt(), lower: limit(old.lower, -1.0), upper: limit(old.upper, 1.0) }
+    };
+    known.iter().enumerate().map(of).collect()
 }
 
 /// The forms that a list of kinds may mean: the length of a moving average is open.

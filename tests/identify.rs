@@ -5,7 +5,8 @@ mod plan;
 
 use std::time::Instant;
 
-use kfdesign::identify::{Identified, Method, ModelChoice, identify_axis, parse_model};
+use kfdesign::filter::likelihood::Stretch;
+use kfdesign::identify::{Identified, Method, ModelChoice, identify_axis, identify_logs, parse_model};
 use kfdesign::noise::{NoiseModel, Term};
 use kfdesign::numerics::random::{StreamId, stream};
 use kfdesign::params::{Params, TermEntry};
@@ -490,7 +491,7 @@ fn averages_and_lines_are_not_fitted_to_the_curve() {
 /// Three axes in one log, the middle one with an unusable sample: the numbers of the command are those of the library.
 fn three_axis_log(bench: &Bench) -> Vec<Vec<f64>> {
     let unit = Unit::parse("deg/s").unwrap();
-    let axes: Vec<Vec<f64>> = (0..3)
+    let mut axes: Vec<Vec<f64>> = (0..3)
         .map(|axis| {
             let rate = log(&[white(N), gauss_markov(SIGMA, 20.0)], 3000, 0.1, 10, axis);
             rate.iter().map(|x| (x + 0.1) * 1e6).map(|x| x.round() / 1e6).collect()
@@ -502,6 +503,7 @@ fn three_axis_log(bench: &Bench) -> Vec<Vec<f64>> {
         text += &format!("{x},{y},{z}\n");
     }
     bench.file("log.csv", text);
+    axes[1][1000] = f64::NAN;
     axes.iter().map(|axis| axis.iter().map(|x| unit.to_si(*x)).collect()).collect()
 }
 
@@ -513,7 +515,7 @@ fn command_writes_what_the_library_finds() {
     assert_eq!(out.status, 0, "{}", out.stderr);
     assert!(
         out.stderr.contains(
-            "gyro_y: the longest stretch without gaps and unusable samples is used: 1999 samples, 1001 left out"
+            "gyro_y: the longest stretch without gaps and unusable samples chooses the terms: 1999 samples, 1001 left out"
         ),
         "{}",
         out.stderr
@@ -526,7 +528,8 @@ fn command_writes_what_the_library_finds() {
     let unit = Unit::parse("deg/s").unwrap();
     for (i, axis) in params.axes.iter().enumerate() {
         let rate = if i == 1 { &axes[1][1001..] } else { &axes[i][..] };
-        let expected = identify_axis(&axis.name, rate, 0.1, &unit, Method::Likelihood, &ModelChoice::Auto).unwrap();
+        let whole = [vec![Stretch { missing: 0, samples: &axes[i] }]];
+        let expected = identify_logs(&axis.name, rate, &whole, 0.1, &unit, &ModelChoice::Auto).unwrap();
         assert_eq!(*axis, Params::from_json(&bench.read("params.json"), "p").unwrap().axes[i]);
         assert_eq!(axis.terms.len(), expected.params.terms.len());
         for (a, b) in axis.noise().terms.iter().zip(&expected.model.terms) {

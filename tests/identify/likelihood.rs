@@ -1,5 +1,6 @@
 //! Maximum likelihood: known truth within the Cramér-Rao bound, nothing invented, odd logs.
 
+mod gaps;
 mod study;
 
 use std::f64::consts::{PI, TAU};

@@ -7,7 +7,7 @@ use super::form::Form;
 use super::ordinates::Ordinates;
 use super::whittle::{self, Fit};
 use crate::filter::likelihood::{LogLikelihood, Stretch, diffuse_log_likelihood};
-use crate::model::{LinearModel, Plant, augment};
+use crate::model::{InitialBias, LinearModel, Plant, augment};
 use crate::noise::{Kind, NoiseModel};
 use crate::units::Quantity;
 
@@ -56,8 +56,11 @@ impl<'a> Exact<'a> {
             piece.term(&values)
         });
         let noise = NoiseModel { terms: terms.collect() };
+        // a model needs a state: for white noise alone one that is zero
+        let zero = Some(InitialBias { mean: 0.0, std_dev: 0.0 });
         // the quantity names units, no numbers
-        augment(Plant::Static, Quantity::AngularRate, &noise, None, self.data.dt, self.data.span_s()).ok()
+        let with = |bias| augment(Plant::Static, Quantity::AngularRate, &noise, bias, self.data.dt, self.data.span_s());
+        with(None).or_else(|_| with(zero)).ok()
     }
 
     fn each(&self, logs: &[f64]) -> Option<Vec<LogLikelihood>> {

@@ -22,7 +22,7 @@ use crate::identify::{
 };
 use crate::input::InputKind;
 use crate::params::{NotIdentified, Params, Source};
-use crate::signal::{LogCheck, Recording};
+use crate::signal::{LogCheck, Recording, upsets};
 use crate::units::Quantity;
 
 /// Noise parameters from a log at rest, with intervals
@@ -47,6 +47,9 @@ pub struct Args {
     /// also osc and ma)
     #[arg(long, value_name = "MODEL", default_value = "auto")]
     model: String,
+    /// Leave outliers out: samples farther from their surroundings than noise goes
+    #[arg(long)]
+    robust: bool,
     /// One HTML page with tables and figures
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
@@ -80,6 +83,8 @@ impl MethodArg {
     }
 }
 
+/// Steps of the level that are listed.
+const MOST_STEPS: usize = 5;
 /// Largest difference of the sample rates of logs of one sensor.
 const SAME_RATE: f64 = 0.005;
 
@@ -169,7 +174,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let axes: Vec<Axis> = parts
         .into_par_iter()
         .map(|part| {
-            let axis = identify(part, dt, args.method.method(), &choice, &readings);
+            let axis = identify(part, dt, args, &choice, &readings);
             bar.inc(1);
             axis
         })
@@ -255,19 +260,25 @@ fn by_axis(logs: &[PathBuf], readings: &[(Recording, LogCheck)], kind: InputKind
 fn identify(
     mut parts: Vec<Stretch>,
     dt: f64,
-    method: Method,
+    args: &Args,
     choice: &ModelChoice,
     readings: &[(Recording, LogCheck)],
 ) -> anyhow::Result<Axis> {
     // the first of the longest
     let longest = (0..parts.len()).rev().max_by_key(|i| parts[*i].rate.len()).unwrap_or(0);
-    let part = &parts[longest];
+    let upsets = upset_words(&parts[longest], dt, args.robust);
+    let dropped: usize = if args.robust { parts.iter_mut().map(Stretch::drop_outliers).sum() } else { 0 };
+    let (part, method) = (&parts[longest], args.method.method());
     let mut found = if method == Method::Likelihood {
         let logs: Vec<_> = parts.iter().map(Stretch::pieces).collect();
         identify_logs(&part.name, &part.rate, &logs, dt, &part.unit, choice)?
     } else {
         identify_axis(&part.name, &part.rate, dt, &part.unit, method, choice)?
     };
+    if dropped > 0 {
+        found.warnings.push(format!("{dropped} outliers were left out"));
+    }
+    found.warnings.extend(upsets);
     let moves = |axis: &Option<String>| axis.as_ref().is_none_or(|name| *name == part.name);
     if readings.iter().any(|(_, check)| check.findings.iter().any(|f| f.kind == "motion" && moves(&f.axis))) {
         found.warnings.push(
@@ -278,6 +289,36 @@ fn identify(
     let part = parts.swap_remove(longest);
     let measured = AxisCurve { stretch: part, curve: found.curve.clone(), fit: Ok(found.model.clone()) };
     Ok(Axis { measured, found })
+}
+
+/// What is in the log that no model of noise has.
+fn upset_words(part: &Stretch, dt: f64, robust: bool) -> Vec<String> {
+    let time = |index: usize| digits(index as f64 * dt);
+    let of = if part.left_out > 0 { " of the longest stretch" } else { "" };
+    let mut words = Vec::new();
+    let outliers = upsets::outliers(&part.rate);
+    if let (Some(first), false) = (outliers.first(), robust) {
+        words.push(format!(
+            "outliers: {} of {} samples are farther from their surroundings than noise goes, the first at {} s{of}; --robust leaves them out",
+            outliers.len(),
+            part.rate.len(),
+            time(*first)
+        ));
+    }
+    let mut clean = part.rate.clone();
+    upsets::fill_outliers(&mut clean);
+    let steps = upsets::steps(&clean, MOST_STEPS);
+    if !steps.is_empty() {
+        let each = steps.iter().map(|step| {
+            let size = digits(part.unit.from_si(step.size));
+            format!("{size} {} at {} s ({} sigma)", part.unit.text(), time(step.index), digits(step.sigmas))
+        });
+        words.push(format!(
+            "the level moves at once: {}{of}; no stationary noise does that, and a model takes it for drift: identify the parts between with --start/--end",
+            each.collect::<Vec<_>>().join(", ")
+        ));
+    }
+    words
 }
 
 fn document<'a>(params: &'a Params, axes: &'a [Axis], readings: &'a [(Recording, LogCheck)]) -> Document<'a> {

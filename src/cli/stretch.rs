@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::filter;
 use crate::input::InputKind;
-use crate::signal::{Gap, Recording};
+use crate::signal::{Gap, Recording, upsets};
 use crate::units::Unit;
 
 /// One axis, SI.
@@ -25,6 +25,24 @@ pub(super) struct Stretch {
 }
 
 impl Stretch {
+    /// Outliers count as missing; how many there are in all. Methods that cannot do without a sample get the median of its surroundings.
+    pub(super) fn drop_outliers(&mut self) -> usize {
+        if self.whole.is_empty() {
+            self.whole = vec![(0, self.rate.clone())];
+        }
+        let mut count = 0;
+        for (_, samples) in &mut self.whole {
+            for index in upsets::outliers(samples) {
+                samples[index] = f64::NAN;
+                count += 1;
+            }
+        }
+        upsets::fill_outliers(&mut self.rate);
+        // the integral would carry an outlier on
+        self.phase = None;
+        count
+    }
+
     /// All of the log, piece by piece.
     pub(super) fn pieces(&self) -> Vec<filter::likelihood::Stretch<'_>> {
         let piece = |missing, samples| filter::likelihood::Stretch { missing, samples };

@@ -4,6 +4,7 @@ pub mod check;
 pub mod correlation;
 pub mod cosine;
 pub mod spectrum;
+pub mod upsets;
 
 use crate::units::{Quantity, Unit};
 

@@ -101,3 +101,33 @@ fn several_logs_on_the_command_line() {
         assert!(out.stderr.contains(words), "{arguments}: {}", out.stderr);
     }
 }
+
+/// Twenty samples 40 sigma off double the power of 20,000 (1 + 20 · 40²/20,000 = 2.6, N 1.6 times); left out, N is the true one within 4 standard deviations of
+/// 1/√(2n). A step of the level is named.
+#[test]
+fn outliers_and_steps_are_told() {
+    let bench = Bench::new();
+    let mut rate = log(&[white(0.05)], 20_000, 0.01, 9, 0);
+    (0..20).for_each(|i| rate[500 + 900 * i] += if i % 2 == 0 { 20.0 } else { -20.0 });
+    let text =
+        |rate: &[f64]| String::from("gyro_x (deg/s)\n") + &rate.iter().map(|x| format!("{x:.6}\n")).collect::<String>();
+    bench.file("spikes.csv", text(&rate));
+    let density = |flags: &str| {
+        let out = bench.run(&format!("identify spikes.csv --rate 100 --model white --json{flags}"));
+        assert_eq!(out.status, 0, "{}", out.stderr);
+        let document: serde_json::Value = serde_json::from_str(&out.stdout).unwrap();
+        let axis = &document["axes"][0];
+        (document["params"]["axes"][0]["white"]["density"]["value"].as_f64().unwrap(), axis["warnings"].to_string())
+    };
+    let (plain, warnings) = density("");
+    assert!((plain / 0.05 - 1.6).abs() < 0.1, "{plain}");
+    assert!(warnings.contains("20 of 20000 samples") && warnings.contains("--robust"), "{warnings}");
+    let (robust, warnings) = density(" --robust");
+    assert!((robust / 0.05 - 1.0).abs() < 4.0 / 40_000f64.sqrt(), "{robust}");
+    assert!(warnings.contains("20 outliers were left out") && !warnings.contains("--robust"), "{warnings}");
+    let mut stepped = log(&[white(0.05)], 20_000, 0.01, 9, 0);
+    stepped[12_000..].iter_mut().for_each(|x| *x += 0.3);
+    bench.file("step.csv", text(&stepped));
+    let text = bench.ok("identify step.csv --rate 100");
+    assert!(text.contains("the level moves at once: 0.") && text.contains("deg/s at 1"), "{text}");
+}

@@ -12,6 +12,7 @@ pub mod effect;
 pub mod low_frequency;
 pub mod multiplicity;
 pub mod normalized;
+pub mod spectrum;
 pub mod whiteness;
 
 use schemars::JsonSchema;

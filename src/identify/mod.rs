@@ -18,8 +18,6 @@ use crate::allan::AllanCurve;
 use crate::filter::likelihood::Stretch;
 use crate::noise::{Kind, NoiseModel, Term};
 use crate::numerics::reduce::mean;
-use nalgebra::Complex;
-
 use crate::params::{AxisParams, Measured, NotIdentified, TermEntry};
 use crate::units::{Unit, digits};
 
@@ -253,30 +251,9 @@ fn entry(term: &Term, intervals: &[Option<[f64; 2]>], display: &Unit) -> Result<
     })
 }
 
-/// The mean of the log with its 95 % interval for the constant bias.
-///
-/// Variance of the record mean over T: N²/T + 2σ²Tc/T·(1 − (Tc/T)(1 − e^(−T/Tc))) for the stationary terms, of an oscillation the
-/// real part at 1/Tc − i2πf₀ in place of 1/Tc. A
-/// random walk, flicker or ramp has no mean; for these the interval is where the mean of an equally long next log will lie
-/// (twice their Allan variance at T).
+/// The mean of the log with its 95 % interval for the constant bias; see [`NoiseModel::mean_variance`].
 fn bias(rate: &[f64], dt: f64, model: &NoiseModel, display: &Unit) -> Measured {
-    let samples = rate.len() as u64;
-    let span = rate.len() as f64 * dt;
-    let variance = |term: &Term| match *term {
-        Term::White { density } | Term::MovingAverage { density, .. } => density * density / span,
-        Term::GaussMarkov { std_dev, correlation_time } => {
-            let x = correlation_time / span;
-            2.0 * std_dev * std_dev * x * (1.0 + x * (-1.0 / x).exp_m1())
-        }
-        Term::Oscillation { std_dev, frequency_hz, correlation_time } => {
-            let x = Complex::new(span / correlation_time, -std::f64::consts::TAU * frequency_hz * span).inv();
-            2.0 * std_dev * std_dev * (x * (x * ((-x.inv()).exp() - 1.0) + 1.0)).re
-        }
-        // the error of the integral over its length
-        Term::Quantization { coefficient } => 2.0 * (coefficient / span).powi(2),
-        other => 2.0 * other.allan_variance(samples, dt),
-    };
-    let sigma = model.terms.iter().map(variance).sum::<f64>().sqrt();
+    let sigma = model.mean_variance(rate.len() as u64, dt).sqrt();
     let value = mean(rate);
     let interval = (!model.terms.is_empty()).then_some([value - 1.96 * sigma, value + 1.96 * sigma]);
     Measured::from_si(value, interval, display.times_time(0))

@@ -12,6 +12,7 @@ mod oscillation;
 mod quantization;
 mod ramp;
 mod random_walk;
+mod record_mean;
 mod second_difference;
 mod white;
 

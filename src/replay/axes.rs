@@ -30,12 +30,16 @@ pub fn assign(design: &FilterDesign, log: &LogShape) -> Result<Vec<usize>, Repla
     }
     let wanted: Vec<&str> = design.axes.iter().map(|a| a.name.as_str()).collect();
     let found: Vec<&str> = log.axes.iter().map(String::as_str).collect();
+    partners(&wanted, &found).ok_or_else(|| ReplayError::Axes { log: found.join(", "), filter: wanted.join(", ") })
+}
+
+/// For each wanted axis the index of its partner among those found; the rule of [`assign`]. None when it cannot be told.
+pub fn partners(wanted: &[&str], found: &[&str]) -> Option<Vec<usize>> {
     let same_name = |a: &str, b: &str| a.trim().eq_ignore_ascii_case(b.trim());
     let same_letter = |a: &str, b: &str| direction(a).is_some() && direction(a) == direction(b);
-    by_rule(&wanted, &found, same_name)
-        .or_else(|| by_rule(&wanted, &found, same_letter))
-        .or_else(|| by_order(&wanted, &found))
-        .ok_or_else(|| ReplayError::Axes { log: found.join(", "), filter: wanted.join(", ") })
+    by_rule(wanted, found, same_name)
+        .or_else(|| by_rule(wanted, found, same_letter))
+        .or_else(|| by_order(wanted, found))
 }
 
 /// Each wanted axis has exactly one partner, and no two share one.

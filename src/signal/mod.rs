@@ -3,6 +3,7 @@
 pub mod check;
 pub mod correlation;
 pub mod cosine;
+pub mod lines;
 pub mod spectrum;
 pub mod upsets;
 

@@ -20,9 +20,9 @@ use super::{
     bias, entry, usable,
 };
 use crate::allan::{self, Deviation, TauGrid};
+use crate::consistency::spectrum::departure;
 use crate::filter::likelihood::Stretch;
 use crate::noise::{Kind, NoiseModel, Term};
-use crate::numerics::distribution::kolmogorov_sf;
 use crate::params::{AxisParams, NotIdentified};
 use crate::units::{Unit, digits};
 use exact::{Exact, Refined};
@@ -285,19 +285,9 @@ fn parameter_name(kind: Kind, number: usize, role: Role) -> String {
 }
 
 /// Probability that the cumulative spectrum of the log, divided by that of the model, departs from a straight line as it does.
-///
-/// With u_j = P_j/S_j ~ χ²₁ independent, D = max |Σ_{i≤j} u_i/Σ u − j/n| and D √(n/2) has Kolmogorov's law (Bartlett 1954).
 fn goodness(data: &Ordinates, fit: &Fit) -> f64 {
-    let of = |(bin, s): (&ordinates::Bin, &f64)| bin.left(fit.slope) / s;
-    let whitened: Vec<f64> = data.bins.iter().zip(&fit.spectrum(data)).map(of).collect();
-    let (total, count) = (whitened.iter().sum::<f64>(), data.bins.iter().map(|bin| bin.count).sum::<f64>());
-    let (mut sum, mut before, mut distance) = (0.0, 0.0, 0.0f64);
-    for (u, bin) in whitened.iter().zip(&data.bins) {
-        sum += u;
-        before += bin.count;
-        distance = distance.max((sum / total - before / count).abs());
-    }
-    kolmogorov_sf(distance * (count / 2.0).sqrt())
+    let of = |(bin, s): (&ordinates::Bin, &f64)| (bin.count, bin.left(fit.slope) / s);
+    departure(&data.bins.iter().zip(&fit.spectrum(data)).map(of).collect::<Vec<_>>()).p_value
 }
 
 /// ln L of the last third of the log under the parameters that the first two thirds give, by candidate.

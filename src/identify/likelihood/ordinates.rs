@@ -1,8 +1,8 @@
 //! The log as cosine coefficients, gathered in bins over which no spectrum changes much.
 
 use crate::noise::Grid;
-use crate::numerics::distribution::chi_square_sf;
 use crate::signal::cosine::cosine_transform;
+use crate::signal::lines::{Line, find_lines};
 
 /// Coefficients up to this number stand alone.
 const ALONE: usize = 32;
@@ -10,10 +10,6 @@ const ALONE: usize = 32;
 const WIDTH: f64 = 1.0 / 40.0;
 /// A line's surroundings are binned this finely: each bin is at most this share of its distance from the line.
 const LINE_WIDTH: f64 = 0.25;
-/// Chance of taking noise for a line, over all frequencies and widths of a log.
-const FALSE_LINE: f64 = 1e-3;
-/// Most lines that are looked for.
-const LINES: usize = 12;
 
 /// Neighbouring coefficients.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,14 +23,6 @@ pub(super) struct Bin {
     pub(super) with_ramp: f64,
     /// dt Σ r².
     pub(super) ramp: f64,
-}
-
-/// A peak in the spectrum.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Line {
-    pub(super) frequency_hz: f64,
-    /// Width of the window in which it stands out most, Hz.
-    pub(super) width_hz: f64,
 }
 
 impl Bin {
@@ -148,62 +136,4 @@ fn width(j: usize, step: f64, lines: &[Line]) -> usize {
         size = size.min((LINE_WIDTH * distance).max(0.1 * line.width_hz / step));
     }
     (size as usize).max(1)
-}
-
-/// Peaks that white noise shaped like the surroundings would show with probability 10⁻³ at most.
-///
-/// The level of the surroundings is the median over a band, which a narrow line does not move (the median of χ²₁ is 0.4549).
-fn find_lines(power: &[f64], step: f64) -> Vec<Line> {
-    const MEDIAN: f64 = 0.454_936_423_119_572_8;
-    // below, drift has its own shapes
-    const FIRST: usize = 256;
-    const BAND: f64 = 0.1;
-    let mut whitened = vec![1.0; power.len()];
-    let mut first = FIRST;
-    while first < power.len() {
-        let size = ((first as f64 * BAND) as usize).max(128).min(power.len() - first);
-        let around = first.saturating_sub(size / 2).max(FIRST / 2)..(first + size + size / 2).min(power.len());
-        let mut sorted = power[around].to_vec();
-        let middle = sorted.len() / 2;
-        let (_, median, _) = sorted.select_nth_unstable_by(middle, f64::total_cmp);
-        let level = *median / MEDIAN;
-        for (w, p) in whitened[first..first + size].iter_mut().zip(&power[first..first + size]) {
-            *w = if level > 0.0 { p / level } else { 1.0 };
-        }
-        first += size;
-    }
-    let mut sums = Vec::with_capacity(power.len() + 1);
-    sums.push(0.0);
-    whitened.iter().fold(0.0, |sum, w| {
-        sums.push(sum + w);
-        sum + w
-    });
-    let mut peaks: Vec<(f64, usize, usize)> = Vec::new();
-    let mut size = 1;
-    while size * 8 <= power.len() - FIRST.min(power.len()) {
-        let tried = (power.len() / size).max(1) as f64 * 16.0;
-        let mut at = FIRST.max(size * 8);
-        while at + size <= power.len() {
-            let sum = sums[at + size] - sums[at];
-            // far beyond the threshold the tail underflows; the excess then ranks
-            if sum > size as f64 + 4.0 * (2.0 * size as f64).sqrt()
-                && chi_square_sf(sum, size as f64) < FALSE_LINE / tried
-            {
-                peaks.push(((sum - size as f64) / (2.0 * size as f64).sqrt(), at, size));
-            }
-            at += size.div_ceil(2);
-        }
-        size *= 2;
-    }
-    peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut found: Vec<Line> = Vec::new();
-    for (_, at, size) in peaks {
-        let frequency_hz = (at as f64 + 1.0 + 0.5 * (size as f64 - 1.0)) * step;
-        let width_hz = size as f64 * step;
-        let near = |line: &Line| (line.frequency_hz - frequency_hz).abs() < 8.0 * (line.width_hz + width_hz);
-        if found.len() < LINES && !found.iter().any(near) {
-            found.push(Line { frequency_hz, width_hz });
-        }
-    }
-    found
 }

@@ -6,6 +6,7 @@
 
 pub mod allan;
 pub mod cli;
+pub mod compare;
 pub mod consistency;
 pub mod export;
 pub mod filter;

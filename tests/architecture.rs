@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// The one table of rooms: floor, room, and the rooms of its own floor it may use besides every lower floor.
 /// `docs/architecture.md` shows the same table.
-const HOUSE: [(u8, &str, &[&str]); 18] = [
+const HOUSE: [(u8, &str, &[&str]); 19] = [
     (0, "units", &[]),
     (0, "numerics", &[]),
     (1, "signal", &[]),
@@ -20,6 +20,7 @@ const HOUSE: [(u8, &str, &[&str]); 18] = [
     (4, "identify", &[]),
     (4, "tune", &[]),
     (4, "replay", &[]),
+    (5, "compare", &[]),
     (5, "montecarlo", &[]),
     (6, "export", &[]),
     (6, "report", &[]),

@@ -414,6 +414,74 @@ fn filters_that_cannot_be_used() {
     ]);
 }
 
+/// A sensor with one axis "x" and two terms, of which one may be changed.
+fn noise(white: &str, more: &str) -> Vec<u8> {
+    format!(
+        r#"{{"format": "kfdesign-params/1", "quantity": "angular-rate", "sample_rate": "100 Hz", "axes": [{{"name": "x"{white}{more}}}]}}"#
+    )
+    .into_bytes()
+}
+
+#[test]
+fn models_that_cannot_be_held_against_a_log() {
+    const WHITE: &str = r#", "white": {"density": "0.1 deg/s/sqrt(Hz)"}"#;
+    // log.npy is what the test makes of rows of two numbers
+    let table = |rows: &dyn Fn(usize) -> f64, count: usize| {
+        let data: Vec<u8> = (0..count).flat_map(|i| rows(i).to_le_bytes()).collect();
+        npy(&format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({count}, 1), }}"), &data)
+    };
+    let noisy = |i: usize| (i * 7919 % 1000) as f64 * 1e-3;
+    let flags = "--columns 1 --unit deg/s --rate 100";
+    let line = r#", "oscillation": [{"std_dev": "1 deg/s", "frequency": "80 Hz", "correlation_time": "1 s"}]"#;
+    let mut wrong = Vec::new();
+    for verb in ["compare", "inflate"] {
+        let more = if verb == "compare" { "--report out.html --plot out.svg" } else { "" };
+        let rows: Vec<(&str, Vec<u8>, Vec<u8>, String, &[&str])> = vec![
+            ("no log", noise(WHITE, ""), vec![], flags.into(), &["log.npy"]),
+            ("no params", b"{".to_vec(), table(&noisy, 500), flags.into(), &["params.json", "line 1"]),
+            ("too short", noise(WHITE, ""), table(&noisy, 60), flags.into(), &["log.npy", "60 samples", "100"]),
+            ("constant", noise(WHITE, ""), table(&|_| 0.5, 500), flags.into(), &["log.npy", "constant", "column"]),
+            (
+                "another quantity",
+                noise(WHITE, ""),
+                table(&noisy, 500),
+                "--columns 1 --unit g --rate 100".into(),
+                &["log.npy", "m/s^2", "rad/s", "--columns"],
+            ),
+            ("no noise", noise("", ""), table(&noisy, 500), flags.into(), &["log.npy", "'x'", "no random noise"]),
+            (
+                "a fast line",
+                noise(WHITE, line),
+                table(&noisy, 500),
+                flags.into(),
+                &["log.npy", "80", "half the sample rate"],
+            ),
+        ];
+        for (what, params, log, flags, words) in rows {
+            let bench = Bench::new();
+            bench.file("params.json", params);
+            if !log.is_empty() {
+                bench.file("log.npy", log);
+            }
+            let before = bench.files();
+            let out = bench.run(&format!("{verb} params.json log.npy {flags} -o out.json {more}"));
+            let last = out.stderr.lines().last().unwrap_or_default();
+            let told = last.starts_with("kfdesign: ") && words.iter().all(|word| last.contains(word));
+            let once = out.stderr.lines().filter(|line| line.starts_with("kfdesign: ")).count() == 1;
+            if out.status != 2 || !told || !once || !out.stdout.is_empty() || bench.files() != before {
+                wrong.push(format!("{verb}, {what}: {out:?}, files {:?}, expected {words:?}", bench.files()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n\n"));
+    assert_refused(vec![
+        ("alpha of two", "x.csv", vec![], "compare p.json x.csv --alpha 2", &["--alpha", "2", "between 0 and 1"]),
+        ("params as output", "p.json", vec![], "compare p.json x.csv -o p.json", &["p.json", "input"]),
+        ("params as inflated", "p.json", vec![], "inflate p.json x.csv -o p.json", &["p.json", "input"]),
+        ("a negative frequency", "p.json", vec![], "inflate p.json x.csv --from=-1", &["--from", "-1"]),
+    ]);
+}
+
 #[test]
 fn outputs_that_cannot_be_written() {
     let csv = || log("t_s,gyro_x (deg/s),gyro_y (deg/s)", usize::MAX, "");

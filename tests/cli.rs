@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 
 use crate::support::{Bench, data};
 
-const COMMANDS: [&str; 6] = ["allan", "identify", "simulate", "tune", "replay", "schema"];
+const COMMANDS: [&str; 8] = ["allan", "identify", "compare", "inflate", "simulate", "tune", "replay", "schema"];
 
 #[test]
 fn every_command_has_help_on_stdout() {
@@ -72,6 +72,10 @@ fn json_is_one_document_and_nothing_else() {
         "schema params",
         "schema filter",
         "schema replay",
+        "schema compare",
+        "schema inflate",
+        &format!("compare {params} log.npy --json"),
+        &format!("inflate {params} log.npy --json"),
     ] {
         let out = bench.run(args);
         assert!(out.status < 2, "{args}: {}", out.stderr);

@@ -8,6 +8,7 @@ mod allan;
 mod architecture;
 mod bad_input;
 mod cli;
+mod compare;
 mod consistency;
 mod deployment;
 mod docs;

@@ -63,6 +63,7 @@ fn allan_data(axis: &str, seed: u64) -> Allan {
         quantity: "Allan deviation".into(),
         unit: "deg/s".into(),
         points: points.collect(),
+        band_label: None,
         total: Some(curve("fitted sum", &|t| components(t).0.hypot(components(t).1))),
         components: vec![
             curve("white noise", &|t| components(t).0),

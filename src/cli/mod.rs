@@ -6,8 +6,10 @@
 
 pub mod allan;
 mod allan_figure;
+pub mod compare;
 mod flags;
 pub mod identify;
+pub mod inflate;
 pub mod log_flags;
 pub mod montecarlo;
 pub mod output;
@@ -16,6 +18,7 @@ pub mod replay;
 pub mod schema;
 pub mod simulate;
 mod stretch;
+mod tests_table;
 pub mod tune;
 
 use std::process::ExitCode;
@@ -49,6 +52,8 @@ enum Command {
     Allan(allan::Args),
     Identify(identify::Args),
     Plan(plan::Args),
+    Compare(compare::Args),
+    Inflate(inflate::Args),
     Simulate(simulate::Args),
     Tune(tune::Args),
     Replay(replay::Args),
@@ -75,6 +80,8 @@ pub fn main() -> ExitCode {
         Command::Allan(args) => allan::run(&args),
         Command::Identify(args) => identify::run(&args),
         Command::Plan(args) => plan::run(&args),
+        Command::Compare(args) => compare::run(&args),
+        Command::Inflate(args) => inflate::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Tune(args) => tune::run(&args),
         Command::Replay(args) => replay::run(&args),

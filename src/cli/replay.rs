@@ -10,7 +10,8 @@ use anyhow::Context;
 use super::Status;
 use super::log_flags::{LogFlags, print_check};
 use super::output::{digits, print_json, print_text, progress, table};
-use crate::consistency::{Test, Verdict};
+use super::tests_table::{TESTS, caption, rows};
+use crate::consistency::Verdict;
 use crate::export::atomic::{AtomicFile, refuse_input_as_output};
 use crate::export::table::TableWriter;
 use crate::filter::FilterDesign;
@@ -179,8 +180,6 @@ fn columns(estimates: &Estimates, innovations: bool) -> Vec<&[f64]> {
 const COUNTS: [&str; 9] =
     ["axis", "log column", "samples", "accepted", "gaps", "missing", "unusable", "rejected", "log-likelihood"];
 const STATES: [&str; 5] = ["axis", "of", "estimate", "sigma", "unit"];
-const TESTS: [&str; 10] =
-    ["axis", "test", "statistic", "lower", "upper", "p", "effect", "interval", "tolerated", "result"];
 
 /// Everything a person wants to see.
 fn text(result: &ReplayResult, unit: Option<&Unit>) -> String {
@@ -188,21 +187,17 @@ fn text(result: &ReplayResult, unit: Option<&Unit>) -> String {
     let tests = if result.tests.is_empty() {
         "\nToo few samples for any test.\n".to_string()
     } else {
-        format!("\n{}:\n{}", tests_caption(result), table(&TESTS, &test_rows(result)))
+        format!(
+            "\n{}:\n{}",
+            caption("the innovations", &result.tests, result.alpha),
+            table(&TESTS, &rows(&result.tests, result.alpha))
+        )
     };
     format!(
         "{}\nEstimates at the end of the log, with the filter's own sigma:\n{states}{tests}\n{}: {}\n",
         table(&COUNTS, &count_rows(result)),
         result.verdict.word(),
         result.meaning
-    )
-}
-
-fn tests_caption(result: &ReplayResult) -> String {
-    format!(
-        "Tests of the innovations: bounds at {} %, each alone; p adjusted for all {} tests (Holm)",
-        digits(100.0 * (1.0 - result.alpha)),
-        result.tests.len()
     )
 }
 
@@ -215,10 +210,6 @@ fn count_rows(result: &ReplayResult) -> Vec<Vec<String>> {
         row
     };
     result.axes.iter().map(row).collect()
-}
-
-fn test_rows(result: &ReplayResult) -> Vec<Vec<String>> {
-    result.tests.iter().map(|t| test_row(t, result.alpha)).collect()
 }
 
 /// The whole estimate of each axis, and its states where they are few; all are in the JSON document.
@@ -240,29 +231,4 @@ fn in_log_unit(value: f64, sigma: f64, si: &str, quantity: Quantity, log: Option
         Some(unit) => (unit.from_si(value), unit.from_si(sigma), unit.to_string()),
         None => (value, sigma, si.to_string()),
     }
-}
-
-fn test_row(test: &Test, alpha: f64) -> Vec<String> {
-    let range = |r: [f64; 2]| format!("{} … {}", digits(r[0]), digits(r[1]));
-    let (value, interval, tolerance) = test.effect.as_ref().map_or_else(
-        || ("-".to_string(), "-".to_string(), "-".to_string()),
-        |e| (digits(e.value), range(e.interval), range(e.tolerance)),
-    );
-    let result = match (test.pass, test.adjusted_p_value < alpha) {
-        (true, false) => "pass",
-        (true, true) => "small",
-        (false, _) => "FAIL",
-    };
-    vec![
-        test.axis.clone(),
-        test.averaging_s.map_or_else(|| test.name.clone(), |s| format!("{} {} s", test.name, digits(s))),
-        digits(test.statistic),
-        digits(test.lower),
-        digits(test.upper),
-        digits(test.adjusted_p_value),
-        value,
-        interval,
-        tolerance,
-        result.to_string(),
-    ]
 }

@@ -3,6 +3,8 @@
 use clap::ValueEnum;
 
 use super::{Status, output};
+use crate::compare::Comparison;
+use crate::compare::inflation::Inflation;
 use crate::filter::FilterDesign;
 use crate::montecarlo;
 use crate::params::Params;
@@ -25,6 +27,10 @@ enum Document {
     Filter,
     /// What `replay --json` prints
     Replay,
+    /// What `compare --json` prints
+    Compare,
+    /// What `inflate --json` prints
+    Inflate,
     /// What `montecarlo` and `merge` write
     Montecarlo,
 }
@@ -34,6 +40,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         Document::Params => Params::schema(),
         Document::Filter => FilterDesign::schema(),
         Document::Montecarlo => montecarlo::document::schema(),
+        Document::Compare => schemars::schema_for!(Comparison).to_value(),
+        Document::Inflate => schemars::schema_for!(Inflation).to_value(),
         Document::Replay => schemars::schema_for!(ReplayResult).to_value(),
     })?;
     Ok(Status::Done)

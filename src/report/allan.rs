@@ -2,6 +2,7 @@
 
 use super::figure::{self, Allan, AllanPoint, Curve};
 use crate::allan::{AllanCurve, NoiseType, edf};
+use crate::compare::AllanEnvelope;
 use crate::noise::{NoiseModel, Term};
 use crate::units::{Unit, digits};
 
@@ -30,8 +31,29 @@ pub fn figure(axis: &str, curve: &AllanCurve, model: Option<&NoiseModel>, unit: 
         quantity: "deviation".into(),
         unit: unit.text().into(),
         points: points.collect(),
+        band_label: None,
         total: model.map(|m| model_curve(curve, m, unit, total_name(m))),
         components: model.map(components).unwrap_or_default(),
+    })
+}
+
+/// The measured curve over the envelope that the model draws around its own, in `unit`.
+pub fn envelope(axis: &str, envelope: &AllanEnvelope, alpha: f64, unit: &Unit) -> String {
+    let curve = |values: &[f64]| {
+        envelope.tau_s.iter().zip(values).map(|(tau, v)| (*tau, unit.from_si(*v))).collect::<Vec<(f64, f64)>>()
+    };
+    let edges = envelope.lower.iter().zip(&envelope.upper);
+    let points = curve(&envelope.measured).into_iter().zip(edges).map(|((tau_s, deviation), (lower, upper))| {
+        AllanPoint { tau_s, deviation, lower: unit.from_si(*lower), upper: unit.from_si(*upper), noise: String::new() }
+    });
+    figure::allan(&Allan {
+        title: format!("{axis}: Allan deviation and the model's envelope"),
+        quantity: "deviation".into(),
+        unit: unit.text().into(),
+        points: points.collect(),
+        band_label: Some(format!("{} % envelope of the model", digits(100.0 * (1.0 - alpha)))),
+        total: Some(Curve { label: "model".into(), points: curve(&envelope.model) }),
+        components: vec![],
     })
 }
 

@@ -1,7 +1,8 @@
 //! Figures and the report page of a replay: a view of [`ReplayResult`].
 
-use super::{COUNTS, STATES, TESTS, count_rows, in_log_unit, state_rows, test_rows, tests_caption};
+use super::{COUNTS, STATES, count_rows, in_log_unit, state_rows};
 use crate::cli::output::digits;
+use crate::cli::tests_table::{self, TESTS, caption};
 use crate::numerics::distribution::{chi_square_cdf, chi_square_sf};
 use crate::replay::{AxisResult, ReplayResult};
 use crate::report::figure::{self, Curve};
@@ -41,8 +42,8 @@ pub(super) fn page(result: &ReplayResult, filter: &str, unit: Option<&Unit>) -> 
                 "A test fails when it is significant and its effect is beyond what is tolerated; 'small' marks a deviation that is \
                  real but within the tolerance. An optimistic filter expects smaller innovations than there are, a pessimistic one larger.",
             )
-            .table(tests_caption(result), &TESTS, test_rows(result))
-            .list(result.tests.iter().filter(|t| t.adjusted_p_value < result.alpha).map(said).collect())
+            .table(caption("the innovations", &result.tests, result.alpha), &TESTS, tests_table::rows(&result.tests, result.alpha))
+            .list(tests_table::said(&result.tests, result.alpha))
     };
     let mut sections = vec![summary, tests];
     for axis in &result.axes {
@@ -55,10 +56,6 @@ pub(super) fn page(result: &ReplayResult, filter: &str, unit: Option<&Unit>) -> 
         provenance,
         sections,
     }
-}
-
-fn said(test: &crate::consistency::Test) -> String {
-    format!("{}, {}: {}.", test.axis, test.name, test.meaning)
 }
 
 /// Figures of one axis with their captions.

@@ -25,6 +25,8 @@ pub struct Allan {
     pub quantity: String,
     pub unit: String,
     pub points: Vec<AllanPoint>,
+    /// What the band is; by default the 95 % interval.
+    pub band_label: Option<String>,
     /// The fitted sum of the components.
     pub total: Option<Curve>,
     pub components: Vec<Curve>,
@@ -59,7 +61,7 @@ pub fn allan(data: &Allan) -> String {
         chart.line(Class::Line(0), measured);
         chart.legend_line(Class::Line(0), "measured");
     }
-    chart.legend_band(0, "95 % interval");
+    chart.legend_band(0, data.band_label.as_deref().unwrap_or("95 % interval"));
     if let Some(total) = &data.total {
         chart.legend_line(Class::Line(1), &total.label);
     }

@@ -8,6 +8,7 @@ mod budget;
 mod chart;
 mod consistency;
 mod error;
+mod ratio;
 mod scale;
 mod sheet;
 mod style;
@@ -19,6 +20,7 @@ pub use consistency::{
     Autocorrelation, Histogram, Nees, Periodogram, autocorrelation, cumulative_periodogram, nees, nis_histogram,
 };
 pub use error::{Component, Errors, Rms, errors, rms};
+pub use ratio::{SpectrumRatio, spectrum_ratio};
 pub use sheet::sheet;
 pub use style::style_sheet;
 pub use trace::{Estimate, Innovations, Sigma, SigmaState, estimate, innovations, sigma};

@@ -1,0 +1,154 @@
+//! `kfdesign compare`.
+
+mod sight;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+
+use super::Status;
+use super::log_flags::{LogFlags, print_check};
+use super::output::{digits, print_json, print_text, table};
+use super::stretch::stretches;
+use super::tests_table::{TESTS, caption, rows};
+use crate::compare::{self, AxisComparison, Comparison, Log, LogAxis};
+use crate::consistency::Verdict;
+use crate::export::atomic;
+use crate::params::Params;
+use crate::signal::LogCheck;
+use crate::units::Unit;
+
+/// Does a noise model fit a log that it may not come from?
+///
+/// The Allan curve within the envelope the model draws around its own, the spectrum over the model's, and what the model's filter leaves of the
+/// log. A test fails when its deviation is significant (Holm, over all tests and axes) and beyond what is tolerated. Exit status 1 only when
+/// the verdict is inconsistent.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example: kfdesign compare params.json other_day.csv --report compare.html")]
+pub struct Args {
+    /// The noise parameters
+    params: PathBuf,
+    /// The log, sensor at rest: text, .gz or .npy
+    log: PathBuf,
+    /// Probability of a false alarm, over all tests together
+    #[arg(long, default_value_t = 0.01, value_name = "P")]
+    alpha: f64,
+    /// The verdict document
+    #[arg(short, long, value_name = "FILE.json")]
+    output: Option<PathBuf>,
+    /// One HTML page with tables and figures
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
+    /// Allan curve and spectral ratio of every axis
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// One JSON document on stdout
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    reading: LogFlags,
+}
+
+/// Parameters and a log at rest, as the commands that hold one against the other read them.
+pub(super) struct Pair {
+    pub(super) params: Params,
+    pub(super) log: Log,
+    pub(super) check: LogCheck,
+    pub(super) sha256: Option<String>,
+    /// Unit of the log's rate.
+    pub(super) unit: Unit,
+}
+
+/// Reads both, prints the log check, and refuses to overwrite either with one of `outputs`.
+pub(super) fn read(
+    params: &Path,
+    log: &Path,
+    reading: &LogFlags,
+    outputs: &[&Option<PathBuf>],
+) -> anyhow::Result<Pair> {
+    for output in outputs.iter().copied().flatten() {
+        atomic::check_output(output, log)?;
+        atomic::refuse_input_as_output(output, params)?;
+    }
+    let params = Params::read(params)?;
+    let options = reading.options()?;
+    let (recording, check) = crate::input::read(log, &options)?;
+    print_check(&recording.name, &check);
+    let parts = stretches(&recording, options.kind);
+    let unit =
+        parts.first().map(|p| p.unit.clone()).with_context(|| format!("{}: no axis to work on", log.display()))?;
+    for part in parts.iter().filter(|p| p.left_out > 0) {
+        eprintln!(
+            "  note: {}: the longest stretch without gaps and unusable samples is used: {} samples, {} left out",
+            part.name,
+            part.rate.len(),
+            part.left_out
+        );
+    }
+    let axes = parts.into_iter().map(|p| LogAxis { name: p.name, rate: p.rate, left_out: p.left_out }).collect();
+    let log = Log { quantity: recording.quantity, sample_rate_hz: recording.sample_rate_hz, axes };
+    Ok(Pair { params, log, check, sha256: recording.sha256, unit })
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
+    compare::check_alpha(args.alpha)?;
+    let pair = read(&args.params, &args.log, &args.reading, &[&args.output, &args.report, &args.plot])?;
+    let mut result =
+        compare::compare(&pair.params, &pair.log, args.alpha).with_context(|| args.log.display().to_string())?;
+    result.params = Some(args.params.display().to_string());
+    result.log = Some(args.log.display().to_string());
+    result.log_sha256 = pair.sha256;
+    if pair.check.findings.iter().any(|f| f.kind == "motion") {
+        let note = "the log is not at rest all the time (see the log check): motion counts as noise here; cut it with --start/--end";
+        result.axes.iter_mut().for_each(|axis| axis.notes.push(note.into()));
+    }
+    if let Some(path) = &args.output {
+        let mut text = serde_json::to_string_pretty(&result)?;
+        text.push('\n');
+        atomic::write(path, text.as_bytes())?;
+    }
+    if let Some(path) = &args.plot {
+        atomic::write(path, sight::sheet(&result, &pair.unit).as_bytes())?;
+    }
+    if let Some(path) = &args.report {
+        atomic::write(path, sight::page(&result, &pair.unit).to_html()?.as_bytes())?;
+    }
+    if args.json {
+        print_json(&result)?;
+    } else {
+        print_text(&text(&result, &pair.unit))?;
+    }
+    Ok(match result.verdict {
+        Verdict::Inconsistent => Status::CheckFailed,
+        Verdict::Consistent | Verdict::Inconclusive => Status::Done,
+    })
+}
+
+const MEANS: [&str; 6] = ["axis", "log column", "samples", "mean of log", "simulated mean", "sigma of a mean"];
+
+/// Everything a person wants to see.
+fn text(result: &Comparison, unit: &Unit) -> String {
+    let mut out = format!(
+        "{}:\n{}",
+        caption("the model on this log", &result.tests, result.alpha),
+        table(&TESTS, &rows(&result.tests, result.alpha))
+    );
+    out += &format!("\nMeans in {unit}, which prove nothing:\n{}", table(&MEANS, &mean_rows(result, unit)));
+    if let Some(axis) = result.axes.first() {
+        out += &format!("{}: {}.\n", axis.name, axis.means.sentence);
+    }
+    for axis in &result.axes {
+        for note in &axis.notes {
+            out += &format!("note: {}: {note}\n", axis.name);
+        }
+    }
+    format!("{out}\n{}: {}\n", result.verdict.word(), result.meaning)
+}
+
+fn mean_rows(result: &Comparison, unit: &Unit) -> Vec<Vec<String>> {
+    let row = |a: &AxisComparison| {
+        let values = [a.means.real, a.means.simulated, a.means.std_dev].map(|v| digits(unit.from_si(v)));
+        [vec![a.name.clone(), a.log_axis.clone(), a.samples.to_string()], values.into()].concat()
+    };
+    result.axes.iter().map(row).collect()
+}

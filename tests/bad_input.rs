@@ -414,6 +414,9 @@ fn filters_that_cannot_be_used() {
     ]);
 }
 
+/// What is wrong, the parameters, the log, its flags, words of the message.
+type Held<'a> = (&'a str, Vec<u8>, Vec<u8>, String, &'a [&'a str]);
+
 /// A sensor with one axis "x" and two terms, of which one may be changed.
 fn noise(white: &str, more: &str) -> Vec<u8> {
     format!(
@@ -436,7 +439,7 @@ fn models_that_cannot_be_held_against_a_log() {
     let mut wrong = Vec::new();
     for verb in ["compare", "inflate"] {
         let more = if verb == "compare" { "--report out.html --plot out.svg" } else { "" };
-        let rows: Vec<(&str, Vec<u8>, Vec<u8>, String, &[&str])> = vec![
+        let rows: Vec<Held> = vec![
             ("no log", noise(WHITE, ""), vec![], flags.into(), &["log.npy"]),
             ("no params", b"{".to_vec(), table(&noisy, 500), flags.into(), &["params.json", "line 1"]),
             ("too short", noise(WHITE, ""), table(&noisy, 60), flags.into(), &["log.npy", "60 samples", "100"]),

@@ -8,7 +8,7 @@ use anyhow::Context;
 
 use super::Status;
 use super::log_flags::{LogFlags, print_check};
-use super::output::{digits, print_json, print_text, table};
+use super::output::{digits, notes, print_json, print_text, table};
 use super::stretch::stretches;
 use super::tests_table::{TESTS, caption, rows};
 use crate::compare::{self, AxisComparison, Comparison, Log, LogAxis};
@@ -137,11 +137,7 @@ fn text(result: &Comparison, unit: &Unit) -> String {
     if let Some(axis) = result.axes.first() {
         out += &format!("{}: {}.\n", axis.name, axis.means.sentence);
     }
-    for axis in &result.axes {
-        for note in &axis.notes {
-            out += &format!("note: {}: {note}\n", axis.name);
-        }
-    }
+    out += &notes(result.axes.iter().map(|a| (a.name.as_str(), a.notes.as_slice())));
     format!("{out}\n{}: {}\n", result.verdict.word(), result.meaning)
 }
 

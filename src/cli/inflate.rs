@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use super::Status;
 use super::compare::{Pair, read};
 use super::log_flags::LogFlags;
-use super::output::{digits, print_json, print_text, table};
+use super::output::{digits, notes, print_json, print_text, table};
 use crate::compare::inflation::{AxisInflation, Inflation, inflated, inflation, usual_from_hz};
 use crate::export::atomic;
 use crate::units::Unit;
@@ -95,10 +95,6 @@ fn text(found: &Inflation, unit: &Unit) -> String {
         let sigma = format!("sigma ({unit})");
         out += &format!("\nLines:\n{}", table(&["axis", "frequency (Hz)", "width (Hz)", &sigma], &lines));
     }
-    for axis in &found.axes {
-        for note in &axis.notes {
-            out += &format!("note: {}: {note}\n", axis.name);
-        }
-    }
+    out += &notes(found.axes.iter().map(|a| (a.name.as_str(), a.notes.as_slice())));
     format!("{out}\nValid for {}.\n", found.valid_for)
 }

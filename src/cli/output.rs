@@ -50,6 +50,20 @@ pub fn progress(total: u64, what: &'static str) -> ProgressBar {
     bar
 }
 
+/// "note: x, y: …" for what is said of each name, each sentence once.
+pub fn notes<'a>(said: impl Iterator<Item = (&'a str, &'a [String])>) -> String {
+    let mut found: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (name, sentences) in said {
+        for sentence in sentences {
+            match found.iter_mut().find(|(other, _)| other == sentence) {
+                Some((_, names)) => names.push(name),
+                None => found.push((sentence, vec![name])),
+            }
+        }
+    }
+    found.iter().map(|(sentence, names)| format!("note: {}: {sentence}\n", names.join(", "))).collect()
+}
+
 /// A text table: first column left, the others right aligned, two spaces between.
 pub fn table(header: &[&str], rows: &[Vec<String>]) -> String {
     let columns = header.len();

@@ -233,7 +233,7 @@ fn lines(ratios: &Ratios, samples: usize, dt: f64, model: &NoiseModel) -> Vec<Vi
     };
     let lowest = ratios.first as f64 * ratios.step_hz;
     let found = find_lines(&whole, ratios.step_hz).into_iter().filter(|l| l.frequency_hz >= lowest);
-    found.map(of).collect()
+    found.map(of).filter(|line| line.std_dev > 0.0).collect()
 }
 
 /// A sentence when the ratio is surely not the same at all frequencies.
@@ -243,9 +243,13 @@ fn not_flat(bands: &[Band], z: &[f64], bound: f64) -> Option<String> {
     let sure = z.iter().any(|z| z.abs() > bound) && most.ratio / most.upper > least.ratio / least.lower;
     let shown =
         |band: &Band| format!("{} at {} to {} Hz", digits(band.ratio.sqrt()), digits(band.from_hz), digits(band.to_hz));
-    (sure && most.ratio > NOT_FLAT * least.ratio).then(|| {
-        format!("the log is not louder by one factor: {}, {}; identify the noise from a log of the running engine at rest if you can", shown(least), shown(most))
-    })
+    let advice = if std::ptr::eq(most, &bands[0]) {
+        "motion may reach into the band: try a higher --from"
+    } else {
+        "white noise times one factor is a rough picture of it"
+    };
+    (sure && most.ratio > NOT_FLAT * least.ratio)
+        .then(|| format!("the log is not louder by one factor: {}, {}; {advice}", shown(least), shown(most)))
 }
 
 /// A sentence when the model's power in the band is not of the terms that are multiplied.

@@ -47,7 +47,7 @@ pub fn envelope(axis: &str, envelope: &AllanEnvelope, alpha: f64, unit: &Unit) -
         AllanPoint { tau_s, deviation, lower: unit.from_si(*lower), upper: unit.from_si(*upper), noise: String::new() }
     });
     figure::allan(&Allan {
-        title: format!("{axis}: Allan deviation and the model's envelope"),
+        title: format!("{axis}: Allan deviation and envelope of the model"),
         quantity: "deviation".into(),
         unit: unit.text().into(),
         points: points.collect(),

@@ -21,7 +21,7 @@ fn figures(axis: &AxisComparison, alpha: f64, unit: &Unit) -> Vec<(String, Strin
     let level = digits(100.0 * (1.0 - alpha));
     let bands = axis.spectrum.iter().map(|b: &Band| [b.from_hz, b.to_hz, b.ratio, b.lower, b.upper]).collect();
     let ratio = figure::spectrum_ratio(&SpectrumRatio {
-        title: format!("{}: spectrum of the log over the model's", axis.name),
+        title: format!("{}: spectrum of the log over that of the model", axis.name),
         bands,
         band_label: format!("{level} % for all bands together"),
     });

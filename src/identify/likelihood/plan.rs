@@ -10,9 +10,10 @@ use serde::Serialize;
 
 use super::form::{Form, Piece};
 use super::interval::covariance;
-use super::ordinates::{Line, Ordinates};
+use super::ordinates::Ordinates;
 use super::{parameter_name, whittle};
 use crate::noise::{Grid, Kind, NoiseModel, Term};
+use crate::signal::lines::Line;
 
 /// The longest log that is thought of: ten years, s.
 pub const LONGEST_S: f64 = 10.0 * 365.25 * 86_400.0;

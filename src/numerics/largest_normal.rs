@@ -118,7 +118,8 @@ mod tests {
                 let found = law.tail(z);
                 // 4096 draws of a value between 1/2 and 1: error below 0.4 %, four of them
                 assert!((found / expected - 1.0).abs() < 0.016, "{r} {z}: {found} and {expected}");
-                assert!((law.quantile(found) - z).abs() < 1e-6 * z || found == law.tail(law.quantile(found)));
+                // the probability moves in steps of a draw, 1/8192 of it at most: 1e-4 in z
+                assert!((law.quantile(found) - z).abs() < 1e-3 * z, "{r} {z}: {}", law.quantile(found));
             }
         }
     }

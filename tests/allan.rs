@@ -8,6 +8,7 @@ mod degrees_of_freedom;
 mod identification;
 mod quadratic_form;
 mod recovery;
+mod wavelet;
 
 use kfdesign::allan::{self, AllanError, Deviation, NoiseType, TauGrid, deviation, edf, noise_id, tau};
 use kfdesign::noise::{NoiseModel, Term};

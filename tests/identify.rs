@@ -1,5 +1,6 @@
 //! Logs to noise parameters: recovery of known truth, honesty about what a log cannot tell, the paper's recipe.
 
+mod gmwm;
 mod likelihood;
 mod plan;
 

@@ -5,6 +5,7 @@ pub mod edf;
 mod lag_sum;
 pub mod noise_id;
 pub mod tau;
+pub mod wavelet;
 
 use rayon::prelude::*;
 use schemars::JsonSchema;

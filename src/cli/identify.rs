@@ -15,6 +15,7 @@ use super::allan::AxisCurve;
 use super::log_flags::{LogFlags, print_check};
 use super::output::{digits, duration, print_json, print_text, progress, table};
 use super::stretch::{Stretch, stretches};
+use crate::allan::wavelet::{self, Level};
 use crate::export::atomic;
 use crate::identify::graphical::Step;
 use crate::identify::{
@@ -71,6 +72,8 @@ enum MethodArg {
     Allan,
     /// Maximum likelihood of the whole log, terms chosen by score, with the Cramér-Rao bound
     Likelihood,
+    /// Generalised method of wavelet moments: Haar wavelet variances, each weighted by the inverse of its own variance
+    Gmwm,
 }
 
 impl MethodArg {
@@ -79,6 +82,7 @@ impl MethodArg {
             MethodArg::Graphical => Method::Graphical,
             MethodArg::Allan => Method::Allan,
             MethodArg::Likelihood => Method::Likelihood,
+            MethodArg::Gmwm => Method::Gmwm,
         }
     }
 }
@@ -123,6 +127,21 @@ struct AxisDocument<'a> {
     steps: &'a [Step],
     warnings: &'a [String],
     allan: CurveDocument,
+    /// Wavelet moments only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    wavelet_variance: Option<WaveletDocument>,
+}
+
+/// Haar wavelet variances by maximum overlap and the model's, in the square of `unit`.
+#[derive(Debug, Serialize)]
+struct WaveletDocument {
+    unit: String,
+    /// The wavelet of level j is 2^j samples long.
+    level: Vec<u32>,
+    variance: Vec<f64>,
+    lower: Vec<f64>,
+    upper: Vec<f64>,
+    model: Vec<f64>,
 }
 
 /// The measured curve and the model's; in `unit`.
@@ -213,7 +232,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         atomic::write(path, sight::page(&params, &axes)?.as_bytes())?;
     }
     if args.json {
-        print_json(&document(&params, &axes, &readings))?;
+        print_json(&document(&params, &axes, &readings, args.method.method()))?;
     } else {
         let text: Vec<String> = axes.iter().map(|axis| text(axis, params.quantity)).collect();
         print_text(&text.join("\n"))?;
@@ -321,7 +340,28 @@ fn upset_words(part: &Stretch, dt: f64, robust: bool) -> Vec<String> {
     words
 }
 
-fn document<'a>(params: &'a Params, axes: &'a [Axis], readings: &'a [(Recording, LogCheck)]) -> Document<'a> {
+fn wavelets(axis: &Axis) -> WaveletDocument {
+    let Axis { measured, found } = axis;
+    let unit = &measured.stretch.unit;
+    let square = |si: f64| unit.from_si(unit.from_si(si));
+    let levels = wavelet::levels(&found.curve);
+    let all = |of: &dyn Fn(&Level) -> f64| levels.iter().map(|level| square(of(level))).collect();
+    WaveletDocument {
+        unit: unit.text().into(),
+        level: levels.iter().map(|level| level.level).collect(),
+        variance: all(&|level| level.variance),
+        lower: all(&|level| level.lower),
+        upper: all(&|level| level.upper),
+        model: all(&|level| wavelet::expected(&found.model, level, found.curve.dt)),
+    }
+}
+
+fn document<'a>(
+    params: &'a Params,
+    axes: &'a [Axis],
+    readings: &'a [(Recording, LogCheck)],
+    method: Method,
+) -> Document<'a> {
     let axis = |axis: &'a Axis| {
         let Axis { measured, found } = axis;
         let points = &found.curve.points;
@@ -351,6 +391,7 @@ fn document<'a>(params: &'a Params, axes: &'a [Axis], readings: &'a [(Recording,
         steps: &a.found.steps,
         warnings: &a.found.warnings,
         allan: axis(a),
+        wavelet_variance: (method == Method::Gmwm).then(|| wavelets(a)),
     });
     let mut logs = readings.iter().map(|(_, check)| check);
     let log = logs.next();

@@ -1,11 +1,11 @@
-//! The weighted fit of the whole Allan curve: terms chosen, intervals given, what the log cannot tell said.
+//! The weighted fit of the whole Allan curve, or of the Haar wavelet variances: terms chosen, intervals given, what the log cannot tell said.
 //!
 //! Rules. A parameter is identified when the upper end of its 95 % interval is at most ten times the lower end; its
 //! interval is exp(ln θ ± 1.96 s), s from the fit, widened by √(χ²/dof) when the model does not explain the curve. The model is the
 //! one of the lowest score (see `selection`) whose parameters are all identified. Interval widths shrink as
 //! T^(−1/2) with the length T of the log (Cramér-Rao): from that the log length that would tell.
 
-use super::points::Points;
+use super::points::{Distance, Points};
 use super::selection::{FIT_LEVEL, PENALTY, Table, score, search};
 use super::shape::{Role, Shape, document_name, in_allan_curve, roles, short_name};
 use super::weighted_fit::{Fit, tolerated};
@@ -28,19 +28,23 @@ pub(super) fn identify(
     dt: f64,
     display: &Unit,
     choice: &ModelChoice,
+    distance: Distance,
 ) -> Result<Identified, IdentifyError> {
     usable(name, rate)?;
     let failed = |message: String| IdentifyError { message: format!("{name}: {message}") };
-    let mut curve =
-        allan::curve(rate, dt, Deviation::Oadev, TauGrid::Log(POINTS_PER_DECADE)).map_err(|e| failed(e.to_string()))?;
-    let points = Points::of_curve(&curve);
+    let grid = match distance {
+        Distance::CubeRoots => TauGrid::Log(POINTS_PER_DECADE),
+        Distance::Variances => TauGrid::Octave,
+    };
+    let mut curve = allan::curve(rate, dt, Deviation::Oadev, grid).map_err(|e| failed(e.to_string()))?;
+    let points = Points::of_curve(&curve, distance);
     let forced = match choice {
         ModelChoice::Auto => None,
         ModelChoice::Terms(kinds) => Some(Shape::new(kinds.clone())),
     };
     if let Some(kind) = forced.iter().flat_map(Shape::kinds).find(|kind| !in_allan_curve(**kind)) {
         return Err(failed(format!(
-            "{} needs --method likelihood: an Allan curve does not show it apart from white noise",
+            "{} needs --method likelihood: averages of the log do not show it apart from white noise",
             short_name(*kind)
         )));
     }

@@ -1,4 +1,4 @@
-//! Logs to noise parameters (floor 4): maximum likelihood, the weighted Allan fit, the paper's graphical recipe.
+//! Logs to noise parameters (floor 4): maximum likelihood, the weighted Allan fit, wavelet moments, the paper's graphical recipe.
 //!
 //! One file or folder per method, one variant of [`Method`] each; what they share is here.
 
@@ -18,6 +18,7 @@ use crate::allan::AllanCurve;
 use crate::filter::likelihood::Stretch;
 use crate::noise::{Kind, NoiseModel, Term};
 use crate::numerics::reduce::mean;
+use points::Distance;
 use crate::params::{AxisParams, Measured, NotIdentified, TermEntry};
 use crate::units::{Unit, digits};
 
@@ -31,6 +32,8 @@ pub enum Method {
     Allan,
     /// Maximum likelihood on the cosine coefficients of the log, terms chosen by score; see `likelihood`.
     Likelihood,
+    /// Generalised method of wavelet moments (Guerrier et al. 2013) on Haar wavelet variances: [`allan_fit`] with other weights.
+    Gmwm,
 }
 
 impl Method {
@@ -40,6 +43,7 @@ impl Method {
             Method::Graphical => "graphical",
             Method::Allan => "allan",
             Method::Likelihood => "likelihood",
+            Method::Gmwm => "gmwm",
         }
     }
 }
@@ -57,7 +61,7 @@ pub enum ModelChoice {
 pub struct Candidate {
     pub model: String,
     pub parameters: usize,
-    /// Weighted sum of squares of the Allan fit and its degrees of freedom.
+    /// Weighted sum of squares of the Allan fit, misfit of the wavelet moments, and the degrees of freedom.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chi_square: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -68,7 +72,7 @@ pub struct Candidate {
     /// ln L of the last third of the log under the parameters that the first two thirds give.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held_out: Option<f64>,
-    /// Lowest wins. Allan fit: χ² plus 4 for every parameter and every process; likelihood: −2 ln L plus a cost for every process.
+    /// Lowest wins. Allan fit and wavelet moments: χ² plus 4 for every parameter and every process; likelihood: −2 ln L plus a cost for every process.
     pub score: f64,
     /// Every parameter has a 95 % interval that says something.
     pub identified: bool,
@@ -140,7 +144,8 @@ pub fn identify_axis(
 ) -> Result<Identified, IdentifyError> {
     match method {
         Method::Graphical => graphical::identify(name, rate, dt, display),
-        Method::Allan => allan_fit::identify(name, rate, dt, display, choice),
+        Method::Allan => allan_fit::identify(name, rate, dt, display, choice, Distance::CubeRoots),
+        Method::Gmwm => allan_fit::identify(name, rate, dt, display, choice, Distance::Variances),
         Method::Likelihood => {
             let whole = [vec![Stretch { missing: 0, samples: rate }]];
             likelihood::identify(name, rate, &whole, dt, display, choice)

@@ -20,6 +20,15 @@ const LONGEST_CORRELATION: f64 = 3.0;
 /// Ratio of tabulated correlation times.
 const NODE_RATIO: f64 = 2.0;
 
+/// In what a fit makes the distance between measured and modelled variances small.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Distance {
+    /// Their cube roots, nearly normal, with their whole covariance.
+    CubeRoots,
+    /// The variances themselves, each weighted by the inverse of its own variance: the generalised method of wavelet moments.
+    Variances,
+}
+
 /// Allan variances at ascending averaging factors, from a shortest one on.
 #[derive(Clone, Debug)]
 pub(super) struct Points {
@@ -35,6 +44,7 @@ struct Table {
     samples: usize,
     /// s.
     dt: f64,
+    distance: Distance,
     /// Mixed second derivatives of the covariance by the squared coefficients of two unit processes; row 0 is the whole table.
     parts: Mutex<Parts>,
 }
@@ -60,11 +70,12 @@ pub(super) struct Covariance {
 
 impl Points {
     /// Points at averaging times up to a third of the log (three averages and more).
-    pub(super) fn of_curve(curve: &AllanCurve) -> Points {
+    pub(super) fn of_curve(curve: &AllanCurve, distance: Distance) -> Points {
         let used = curve.points.iter().filter(|p| p.m as usize <= curve.samples / 3 && p.deviation > 0.0);
         let (factors, variances) = used.map(|p| (p.m, p.deviation * p.deviation)).unzip();
         let parts = Mutex::new(BTreeMap::new());
-        Points { table: Arc::new(Table { factors, variances, samples: curve.samples, dt: curve.dt, parts }), skip: 0 }
+        let table = Table { factors, variances, samples: curve.samples, dt: curve.dt, distance, parts };
+        Points { table: Arc::new(table), skip: 0 }
     }
     /// The points at and above an averaging factor.
     pub(super) fn starting_at(&self, first: u64) -> Points {
@@ -85,6 +96,9 @@ impl Points {
     }
     pub(super) fn dt(&self) -> f64 {
         self.table.dt
+    }
+    pub(super) fn distance(&self) -> Distance {
+        self.table.distance
     }
     pub(super) fn span_s(&self) -> f64 {
         self.samples() as f64 * self.dt()
@@ -210,7 +224,7 @@ mod tests {
         let rate: Vec<f64> = (0..3000).map(|k| f64::from(k * 7919 % 1000) / 1000.0).collect();
         let dt = 0.5;
         let curve = allan::curve(&rate, dt, Deviation::Oadev, TauGrid::Log(3)).unwrap();
-        let points = Points::of_curve(&curve).starting_at(2);
+        let points = Points::of_curve(&curve, Distance::CubeRoots).starting_at(2);
         let model = |factor: f64| NoiseModel {
             terms: vec![
                 Term::Quantization { coefficient: 0.1 },

@@ -201,7 +201,7 @@ impl Law {
         let mut spare: Vec<f64> = Vec::new();
         for link in &self.links {
             let n = link.size;
-            let count = if before == 0 { 1 } else { columns.len() / before };
+            let count = columns.len().checked_div(before).unwrap_or(1);
             spare.clear();
             spare.resize(count * n, 0.0);
             for (c, column) in spare.chunks_exact_mut(n.max(1)).enumerate() {

@@ -18,9 +18,9 @@ use crate::allan::AllanCurve;
 use crate::filter::likelihood::Stretch;
 use crate::noise::{Kind, NoiseModel, Term};
 use crate::numerics::reduce::mean;
-use points::Distance;
 use crate::params::{AxisParams, Measured, NotIdentified, TermEntry};
 use crate::units::{Unit, digits};
+use points::Distance;
 
 /// How parameters are taken from a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]

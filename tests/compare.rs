@@ -203,6 +203,15 @@ fn a_short_log_decides_nothing_about_drift() {
     assert_eq!((found.verdict, found.tests.len()), (Verdict::Consistent, 3));
 }
 
+/// A log that says the same all the time, whatever read it, is refused with the axis and what to do.
+#[test]
+fn a_constant_axis_is_refused() {
+    let mut still = log(&params(&[WHITE]), 200, 8);
+    still.axes[0].rate.fill(0.5);
+    let message = compare(&params(&[WHITE]), &still, 0.01).unwrap_err().to_string();
+    assert!(message.starts_with("axis 'x': constant (0.5000 in SI units, 200 samples)"), "{message}");
+}
+
 #[test]
 fn the_command_writes_one_document_and_its_views() {
     let bench = Bench::new();

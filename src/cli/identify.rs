@@ -19,7 +19,8 @@ use crate::allan::wavelet::{self, Level};
 use crate::export::atomic;
 use crate::identify::graphical::Step;
 use crate::identify::{
-    Candidate, Identified, Method, ModelChoice, Precision, identify_axis, identify_logs, parse_model,
+    Candidate, Identified, Method, ModelChoice, Precision, SharedTime, TimeProfile, identify_axis, identify_logs,
+    parse_model, shared_time,
 };
 use crate::input::InputKind;
 use crate::params::{NotIdentified, Params, Source};
@@ -87,6 +88,8 @@ impl MethodArg {
     }
 }
 
+/// Below this p-value the axes have different correlation times.
+const SAME_TIME: f64 = 0.01;
 /// Steps of the level that are listed.
 const MOST_STEPS: usize = 5;
 /// Largest difference of the sample rates of logs of one sensor.
@@ -103,6 +106,9 @@ struct Document<'a> {
     log: Option<&'a LogCheck>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     further_logs: Vec<&'a LogCheck>,
+    /// Where every axis has one Gauss-Markov process, by likelihood.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shared_correlation_time: Option<SharedTime>,
 }
 
 /// How the parameters of one axis came about.
@@ -395,7 +401,28 @@ fn document<'a>(
     });
     let mut logs = readings.iter().map(|(_, check)| check);
     let log = logs.next();
-    Document { format: "kfdesign-identify/1", params, axes: axes.collect(), log, further_logs: logs.collect() }
+    Document {
+        format: "kfdesign-identify/1",
+        params,
+        axes: axes.collect(),
+        log,
+        further_logs: logs.collect(),
+        shared_correlation_time: None,
+    }
+}
+
+/// Whether the axes have one correlation time.
+fn shared_words(shared: &SharedTime) -> String {
+    let limit = |limit: Option<f64>| limit.map_or("open".into(), digits);
+    format!(
+        "One correlation time for all axes: {} s ({} … {}); likelihood ratio {}, p = {}: {}\n",
+        digits(shared.correlation_time_s),
+        limit(shared.lower_s),
+        limit(shared.upper_s),
+        digits(shared.likelihood_ratio),
+        digits(shared.p_value),
+        if shared.p_value < SAME_TIME { "the axes differ" } else { "the log does not tell the axes apart" }
+    )
 }
 
 const STEPS: [&str; 4] = ["step", "formula", "value", "unit"];

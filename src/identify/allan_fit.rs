@@ -88,6 +88,7 @@ pub(super) fn identify(
         candidates: candidates(&table, fit),
         precision: vec![],
         exact_log_likelihood: None,
+        time_profile: None,
         not_identified,
         warnings,
         steps: vec![],

@@ -113,6 +113,7 @@ pub(super) fn identify(name: &str, rate: &[f64], dt: f64, display: &Unit) -> Res
         candidates: vec![],
         precision: vec![],
         exact_log_likelihood: None,
+        time_profile: None,
         not_identified,
         warnings,
         steps,

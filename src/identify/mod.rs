@@ -20,6 +20,7 @@ use crate::noise::{Kind, NoiseModel, Term};
 use crate::numerics::reduce::mean;
 use crate::params::{AxisParams, Measured, NotIdentified, TermEntry};
 use crate::units::{Unit, digits};
+pub use likelihood::shared::{SharedTime, TimeProfile, shared_time};
 use points::Distance;
 
 /// How parameters are taken from a log.
@@ -104,6 +105,8 @@ pub struct Identified {
     pub precision: Vec<Precision>,
     /// Diffuse ln L of the samples (SI) at these parameters, by a Kalman filter; `None` where it would take too long.
     pub exact_log_likelihood: Option<f64>,
+    /// Likelihood only, with one Gauss-Markov process: to compare the axes.
+    pub time_profile: Option<TimeProfile>,
     pub not_identified: Vec<NotIdentified>,
     /// Sentences for a person.
     pub warnings: Vec<String>,

@@ -1,6 +1,7 @@
 //! Maximum likelihood: known truth within the Cramér-Rao bound, nothing invented, odd logs.
 
 mod gaps;
+mod shared;
 mod study;
 
 use std::f64::consts::{PI, TAU};

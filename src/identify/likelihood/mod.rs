@@ -9,6 +9,7 @@ mod growth;
 mod interval;
 mod ordinates;
 pub mod plan;
+pub(super) mod shared;
 mod turn_on;
 mod whittle;
 
@@ -130,6 +131,7 @@ pub(super) fn identify(
             not_identified: not_identified.clone(),
         },
         precision: known_precision(&terms),
+        time_profile: shared::TimeProfile::new(&data, on_cosines),
         exact_log_likelihood: refined.map(|refined| refined.log_likelihood),
         warnings: words.warnings(fit, fit_p_value),
         model,

@@ -237,10 +237,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if let Some(path) = &args.report {
         atomic::write(path, sight::page(&params, &axes)?.as_bytes())?;
     }
+    let profiles: Vec<&TimeProfile> = axes.iter().filter_map(|axis| axis.found.time_profile.as_ref()).collect();
+    let shared = (profiles.len() == axes.len()).then(|| shared_time(&profiles)).flatten();
     if args.json {
-        print_json(&document(&params, &axes, &readings, args.method.method()))?;
+        let document = document(&params, &axes, &readings, args.method.method());
+        print_json(&Document { shared_correlation_time: shared, ..document })?;
     } else {
-        let text: Vec<String> = axes.iter().map(|axis| text(axis, params.quantity)).collect();
+        let mut text: Vec<String> = axes.iter().map(|axis| text(axis, params.quantity)).collect();
+        text.extend(shared.as_ref().map(shared_words));
         print_text(&text.join("\n"))?;
     }
     Ok(Status::Done)

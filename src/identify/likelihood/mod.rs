@@ -37,6 +37,8 @@ use whittle::Fit;
 const POINTS_PER_DECADE: usize = 5;
 /// A model this close in score to the chosen one explains the log about as well.
 const CLOSE: f64 = 6.0;
+/// Gain in ln L of the last third that outweighs a worse score.
+const CLEARLY: f64 = 3.0;
 /// Candidates whose parameters are looked at, at most.
 const LOOKED_AT: usize = 12;
 /// Candidates that are tried on the part of the log they have not seen.
@@ -73,8 +75,8 @@ pub(super) fn identify(
         })
         .collect();
     fits.sort_by(|a, b| score(&a.0, &data).total_cmp(&score(&b.0, &data)));
-    let chosen =
-        if forced { 0 } else { fits.iter().position(|(fit, known)| unknown(fit, known).is_empty()).unwrap_or(0) };
+    let held_out = held_out(rate, &data, &fits);
+    let chosen = if forced { 0 } else { choice_of(&data, &fits, &held_out) };
     let Some((on_cosines, known)) = fits.get(chosen) else {
         let line = matches!(choice, ModelChoice::Terms(kinds) if kinds.contains(&Kind::Oscillation));
         return Err(failed(if line {
@@ -105,7 +107,6 @@ pub(super) fn identify(
         not_identified.extend(words.no_drift(fit));
     }
     let fit_p_value = goodness(&data, fit);
-    let held_out = held_out(rate, &data, &fits);
     let candidate = |(i, (fit, known)): (usize, &(Fit, Vec<Precision>))| Candidate {
         model: fit.form.label(),
         parameters: fit.form.parameters(),
@@ -290,6 +291,22 @@ fn parameter_name(kind: Kind, number: usize, role: Role) -> String {
 fn goodness(data: &Ordinates, fit: &Fit) -> f64 {
     let of = |(bin, s): (&ordinates::Bin, &f64)| (bin.count, bin.left(fit.slope) / s);
     departure(&data.bins.iter().zip(&fit.spectrum(data)).map(of).collect::<Vec<_>>()).p_value
+}
+
+/// The best score among models whose parameters are known; a model that is close in score takes its place when it foretells the last third of the log
+/// clearly better.
+fn choice_of(data: &Ordinates, fits: &[(Fit, Vec<Precision>)], held_out: &[Option<f64>]) -> usize {
+    let identified = |i: &usize| unknown(&fits[*i].0, &fits[*i].1).is_empty();
+    let Some(first) = (0..fits.len()).find(identified) else { return 0 };
+    let foretold = |i: usize| held_out.get(i).copied().flatten();
+    let Some(known) = foretold(first) else { return first };
+    (first..fits.len())
+        .filter(identified)
+        .filter(|i| score(&fits[*i].0, data) - score(&fits[first].0, data) < CLOSE)
+        .filter_map(|i| Some((i, foretold(i)?)))
+        .filter(|(i, value)| *i == first || value - known > CLEARLY)
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .map_or(first, |(i, _)| i)
 }
 
 /// ln L of the last third of the log under the parameters that the first two thirds give, by candidate.

@@ -48,3 +48,22 @@ fn one_axis_or_another_model_has_nothing_to_share() {
     let rate = log(&[white(0.05)], 4000, 1.0, 6, 0);
     assert!(identify(&rate, 1.0, &parse_model("white").unwrap()).time_profile.is_none());
 }
+
+/// The command says it of a log whose axes all have a drift of their own.
+#[test]
+fn the_command_says_whether_the_axes_share_a_time() {
+    let bench = crate::support::Bench::new();
+    let axes = [0, 1].map(|axis| log(&[white(0.02), gauss_markov(0.1, 40.0)], 8000, 1.0, 3, axis));
+    let rows: String = axes[0].iter().zip(&axes[1]).map(|(x, y)| format!("{x:.6},{y:.6}\n")).collect();
+    bench.file("log.csv", format!("gyro_x (deg/s),gyro_y (deg/s)\n{rows}"));
+    let text = bench.ok("identify log.csv --rate 1 --model white+gm");
+    assert!(
+        text.contains("One correlation time for all axes: ") && text.contains("does not tell the axes apart"),
+        "{text}"
+    );
+    let json: serde_json::Value =
+        serde_json::from_str(&bench.ok("identify log.csv --rate 1 --model white+gm --json")).unwrap();
+    assert!(json["shared_correlation_time"]["p_value"].as_f64().unwrap() > 1e-5, "{json}");
+    let one = bench.ok("identify log.csv --rate 1 --model white+gm --columns 1");
+    assert!(!one.contains("One correlation time"), "{one}");
+}

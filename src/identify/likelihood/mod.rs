@@ -145,7 +145,8 @@ pub(super) fn identify(
     })
 }
 
-/// What is known of each logarithm at the maximum of the exact likelihood: intervals move along, and shrink where there was more to be seen.
+/// What is known of each logarithm at the maximum of the exact likelihood: intervals of what is known well move along, and shrink where there was
+/// more to be seen.
 fn moved(
     before: &Fit,
     known: &[Precision],
@@ -159,10 +160,13 @@ fn moved(
     let of = |(i, old): (usize, &Precision)| {
         let (from, to) = (before.logs[i], refined.logs[i]);
         let sigma = sigmas.as_ref().map_or(old.sigma, |all| all[i]);
+        let parabola = old.sigma < PARABOLA;
         let shrunk = if old.sigma.is_finite() { (sigma / old.sigma).min(1.0) } else { 1.0 };
         let limit = |old: Option<f64>, side: f64| match old {
             _ if sigmas.is_some() && sigma < PARABOLA => Some(to + side * NORMAL_95 * sigma),
-            old => old.map(|old| to + (old - from) * shrunk),
+            old if parabola => old.map(|old| to + (old - from) * shrunk),
+            // where the likelihood is flat its maximum moves far, its limits do not
+            old => old,
         };
         Precision { sigma, bound: old.bound / more.sqrt(), lower: limit(old.lower, -1.0), upper: limit(old.upper, 1.0) }
     };

@@ -207,15 +207,12 @@ fn axis_curve(stretch: Stretch, dt: f64, kind: Deviation, grid: TauGrid) -> anyh
 
 /// What a person should know about an axis beside the numbers, on stderr.
 fn notes(axis: &AxisCurve) {
-    let Stretch { name, rate, left_out, .. } = &axis.stretch;
-    if *left_out > 0 {
-        eprintln!(
-            "  note: {name}: the longest stretch without gaps and unusable samples is used: {} samples, {left_out} left out",
-            rate.len()
-        );
-    }
+    axis.stretch.print_left_out("is used");
     if let Err(reason) = &axis.fit {
-        eprintln!("  note: {name}: intervals are for the power law at each tau, no mixture was fitted: {reason}");
+        eprintln!(
+            "  note: {}: intervals are for the power law at each tau, no mixture was fitted: {reason}",
+            axis.stretch.name
+        );
     }
 }
 

@@ -77,14 +77,7 @@ pub(super) fn read(
     let parts = stretches(&recording, options.kind);
     let unit =
         parts.first().map(|p| p.unit.clone()).with_context(|| format!("{}: no axis to work on", log.display()))?;
-    for part in parts.iter().filter(|p| p.left_out > 0) {
-        eprintln!(
-            "  note: {}: the longest stretch without gaps and unusable samples is used: {} samples, {} left out",
-            part.name,
-            part.rate.len(),
-            part.left_out
-        );
-    }
+    parts.iter().for_each(|part| part.print_left_out("is used"));
     let axes = parts.into_iter().map(|p| LogAxis { name: p.name, rate: p.rate, left_out: p.left_out }).collect();
     let log = Log { quantity: recording.quantity, sample_rate_hz: recording.sample_rate_hz, axes };
     Ok(Pair { params, log, check, sha256: recording.sha256, unit })

@@ -24,6 +24,7 @@ use crate::identify::{
 };
 use crate::input::InputKind;
 use crate::params::{NotIdentified, Params, Source};
+use crate::replay::axes::RATE_TOLERANCE;
 use crate::signal::{LogCheck, Recording, upsets};
 use crate::units::Quantity;
 
@@ -92,8 +93,6 @@ impl MethodArg {
 const SAME_TIME: f64 = 0.01;
 /// Steps of the level that are listed.
 const MOST_STEPS: usize = 5;
-/// Largest difference of the sample rates of logs of one sensor.
-const SAME_RATE: f64 = 0.005;
 
 /// What `identify --json` prints.
 #[derive(Debug, Serialize)]
@@ -205,15 +204,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         })
         .collect::<anyhow::Result<_>>()?;
     bar.finish_and_clear();
-    for Axis { measured: AxisCurve { stretch, .. }, .. } in axes.iter().filter(|a| a.measured.stretch.left_out > 0) {
-        eprintln!(
-            "  note: {}: the longest stretch without gaps and unusable samples {}: {} samples, {} left out",
-            stretch.name,
-            if args.method == MethodArg::Likelihood { "chooses the terms" } else { "is used" },
-            stretch.rate.len(),
-            stretch.left_out
-        );
-    }
+    let role = if args.method == MethodArg::Likelihood { "chooses the terms" } else { "is used" };
+    axes.iter().for_each(|axis| axis.measured.stretch.print_left_out(role));
     let params = Params {
         quantity: recording.quantity,
         sample_rate_hz: recording.sample_rate_hz,
@@ -270,7 +262,7 @@ fn by_axis(logs: &[PathBuf], readings: &[(Recording, LogCheck)], kind: InputKind
             return Err(differs("quantity", recording.quantity.name(), first.quantity.name()));
         }
         let [rate, expected] = [recording, first].map(|r| r.sample_rate_hz);
-        if (rate / expected - 1.0).abs() > SAME_RATE {
+        if (rate / expected - 1.0).abs() > RATE_TOLERANCE {
             return Err(differs("sample rate", &format!("{} Hz", digits(rate)), &format!("{} Hz", digits(expected))));
         }
         let further = stretches(recording, kind);

@@ -43,6 +43,18 @@ impl Stretch {
         count
     }
 
+    /// What of the log is outside the stretch, on stderr; `role`: of the stretch.
+    pub(super) fn print_left_out(&self, role: &str) {
+        if self.left_out > 0 {
+            eprintln!(
+                "  note: {}: the longest stretch without gaps and unusable samples {role}: {} samples, {} left out",
+                self.name,
+                self.rate.len(),
+                self.left_out
+            );
+        }
+    }
+
     /// All of the log, piece by piece.
     pub(super) fn pieces(&self) -> Vec<filter::likelihood::Stretch<'_>> {
         let piece = |missing, samples| filter::likelihood::Stretch { missing, samples };

@@ -10,22 +10,18 @@ use serde::Serialize;
 use super::spectrum::{Band, Ratios};
 use super::{CompareError, Log, LogAxis, other_rate, paired};
 use crate::noise::{Kind, NoiseModel};
-use crate::numerics::distribution::chi_square_quantile;
+use crate::numerics::distribution::{CHI_SQUARE_1_MEDIAN, NORMAL_95, chi_square_quantile};
 use crate::numerics::reduce::mean;
 use crate::params::{AxisParams, Params, Source, TermEntry};
 use crate::signal::lines::find_lines;
 use crate::units::{Quantity, digits};
 
-/// Median of χ²₁.
-const MEDIAN: f64 = 0.454_936_423_119_572_8;
 /// Share of the log over which each end is brought to zero.
 const TAPER: f64 = 0.05;
 /// Fewest coefficients in the band.
 const FEWEST: usize = 100;
 /// Level of the bounds of the bands.
 const ALPHA: f64 = 0.05;
-/// Two-sided 95 % point of the normal distribution.
-const NORMAL_95: f64 = 1.959_963_985;
 /// Lines are said to matter when the factor is so many times the robust one.
 const LINES_MATTER: f64 = 1.05;
 /// And the excess is said not to be white when the powers of two bands are so many times apart.
@@ -208,7 +204,7 @@ fn robust(ratios: &Ratios) -> (f64, [f64; 2]) {
     sorted.sort_by(f64::total_cmp);
     let n = sorted.len() as f64;
     let half = 0.5 * NORMAL_95 * (n / ratios.dof).sqrt();
-    let at = |rank: f64| (sorted[(rank.max(0.0) as usize).min(sorted.len() - 1)] / MEDIAN).sqrt();
+    let at = |rank: f64| (sorted[(rank.max(0.0) as usize).min(sorted.len() - 1)] / CHI_SQUARE_1_MEDIAN).sqrt();
     (at(0.5 * n), [at(0.5 * n - half), at(0.5 * n + half)])
 }
 
@@ -216,7 +212,7 @@ fn robust(ratios: &Ratios) -> (f64, [f64; 2]) {
 /// 10⁻³ without it, is below 10⁻².
 fn lines(ratios: &Ratios, samples: usize, dt: f64, model: &NoiseModel) -> Vec<VibrationLine> {
     // below the band stands its own level, where nothing is a line
-    let mut whole = vec![MEDIAN * robust(ratios).0.powi(2); ratios.first - 1];
+    let mut whole = vec![CHI_SQUARE_1_MEDIAN * robust(ratios).0.powi(2); ratios.first - 1];
     whole.extend(&ratios.values);
     let of = |line: crate::signal::lines::Line| {
         let number = |hz: f64| ((hz / ratios.step_hz) as usize).clamp(1, whole.len()) - 1;
@@ -225,7 +221,7 @@ fn lines(ratios: &Ratios, samples: usize, dt: f64, model: &NoiseModel) -> Vec<Vi
         let around = number(line.frequency_hz - 20.0 * reach)..number(line.frequency_hz + 20.0 * reach) + 1;
         let mut sorted = whole[around].to_vec();
         let middle = sorted.len() / 2;
-        let level = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1 / MEDIAN;
+        let level = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1 / CHI_SQUARE_1_MEDIAN;
         let excess: f64 = whole[inside].iter().map(|u| u - level).sum();
         // Σ c²/n is the variance of the samples, c² = u S/dt
         let variance = excess * model.psd(line.frequency_hz, dt) / (dt * samples as f64);

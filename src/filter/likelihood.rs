@@ -96,17 +96,20 @@ struct Run {
 }
 
 impl Run {
-    /// Steps without a measurement.
+    /// Steps without a measurement; the cost grows with their logarithm.
     fn pause(&mut self, steps: u64, first: bool) {
         if steps == 0 {
             return;
         }
         // x0, P0 belong to the first sample, usable or not
         let steps = steps - u64::from(first);
-        self.filter.predict_many(steps);
-        for _ in 0..steps {
-            self.predict_states();
+        for x in &mut self.states {
+            let mut carrier = self.filter.clone();
+            carrier.x.copy_from_slice(x);
+            carrier.predict_many(steps);
+            x.copy_from_slice(carrier.x.as_slice());
         }
+        self.filter.predict_many(steps);
         self.settled = false;
     }
 

@@ -9,11 +9,10 @@ use super::points::{Distance, Points};
 use super::selection::{FIT_LEVEL, PENALTY, Table, score, search};
 use super::shape::{Role, Shape, document_name, in_allan_curve, roles, short_name};
 use super::weighted_fit::{Fit, tolerated};
-use super::{
-    Candidate, Identified, IdentifyError, LENGTHS_TO_TELL, ModelChoice, NORMAL_95, WIDEST_INTERVAL, bias, entry, usable,
-};
+use super::{Candidate, Identified, IdentifyError, LENGTHS_TO_TELL, ModelChoice, WIDEST_INTERVAL, bias, entry, usable};
 use crate::allan::{self, AllanCurve, Deviation, TauGrid};
 use crate::noise::{Kind, NoiseModel, Term};
+use crate::numerics::distribution::NORMAL_95;
 use crate::params::{AxisParams, NotIdentified};
 use crate::units::{Unit, digits};
 

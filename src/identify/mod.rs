@@ -126,8 +126,6 @@ pub struct IdentifyError {
 
 /// Largest upper/lower ratio of a 95 % interval that still says something.
 const WIDEST_INTERVAL: f64 = 10.0;
-/// Two-sided 95 % point of the normal distribution.
-const NORMAL_95: f64 = 1.959_963_985;
 /// A random walk and a Gauss-Markov process differ visibly in a log of this many correlation times.
 const LENGTHS_TO_TELL: f64 = 20.0;
 

@@ -3,7 +3,8 @@
 //! For a true filter the errors at the epochs are a Gauss-Markov chain, e' = Φ e + c with c ~ N(0, P' − Φ P Φᵀ), and the innovations are
 //! independent N(0, 1). What the gate looks at are sums over M runs, so only E Eᵀ and E 1 of the n × M matrix E of errors matter. Runs can
 //! be rotated without changing the law: the first column is then the mean (times √M), the rest a triangular factor of a Wishart matrix, and a
-//! step of the chain needs about n² random numbers whatever M is. Of many states only what two epochs have in common is followed. One replicate of a gate of 1000 runs of 60 000 steps costs microseconds.
+//! step of the chain needs about n² random numbers whatever M is. Of many states only what two epochs have in common is followed. One replicate
+//! of a gate of 1000 runs of 60 000 steps costs microseconds.
 //! Exact for NEES, mean errors and block powers; of relative order 1/(number of updates) for autocorrelations. Left out are the dependence
 //! between errors and innovations and that between periodogram and block powers; both make the gate milder than alpha, if anything, and
 //! whole experiments have not told the difference (docs/validation.md).

@@ -5,11 +5,9 @@ use super::course::model_of;
 use super::lanes::PARAMETERS;
 use crate::filter::FilterDesign;
 use crate::model::LinearModel;
+use crate::numerics::distribution::NORMAL_95;
 use crate::numerics::random::{StreamId, normal, stream};
 use crate::params::{AxisParams, Measured};
-
-/// 97.5 % point of the normal law: half of a 95 % interval in standard deviations.
-const Z95: f64 = 1.959_963_984_540_054;
 
 /// Parameters of one axis with their intervals.
 #[derive(Clone, Debug)]
@@ -54,5 +52,5 @@ fn log_spread(parameter: &Measured) -> Option<f64> {
         (Some(below), Some(above)) => 0.5 * (below + above),
         (one, other) => one.or(other)?,
     };
-    Some(width / Z95).filter(|spread| *spread > 0.0)
+    Some(width / NORMAL_95).filter(|spread| *spread > 0.0)
 }

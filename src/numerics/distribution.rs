@@ -7,6 +7,11 @@
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 use statrs::function::gamma::{checked_gamma_lr, checked_gamma_ur};
 
+/// Two-sided 95 % point of the normal distribution.
+pub const NORMAL_95: f64 = 1.959_963_984_540_054;
+/// Median of χ²₁.
+pub const CHI_SQUARE_1_MEDIAN: f64 = 0.454_936_423_119_572_8;
+
 /// Above this many degrees of freedom Temme's expansion is used: its neglected term is below 5e-10 of the tail there, and
 /// the rounding of x^a e^{-x}/Γ(a) in `statrs` is not yet above 1e-10.
 const LARGE_DOF: f64 = 2e5;

@@ -10,7 +10,7 @@
 //! Nothing is repaired. NaN stays NaN, a gap stays a gap with its number of missing samples, everything else is kept.
 
 mod axis;
-mod robust;
+pub(super) mod robust;
 mod stamps;
 
 use std::ops::Range;

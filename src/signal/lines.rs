@@ -1,6 +1,6 @@
 //! Narrow peaks that stand out of the spectrum of a log.
 
-use crate::numerics::distribution::chi_square_sf;
+use crate::numerics::distribution::{CHI_SQUARE_1_MEDIAN, chi_square_sf};
 
 /// Chance of taking noise for a line, over all frequencies and widths of a log.
 const FALSE_LINE: f64 = 1e-3;
@@ -20,7 +20,6 @@ pub struct Line {
 /// `power`: squares of the cosine coefficients 1, 2, …, in any unit; `step`: their distance in Hz, 1/(2 n dt). Looked for above number 256.
 /// The level of the surroundings is the median over a band, which a narrow line does not move (the median of χ²₁ is 0.4549).
 pub fn find_lines(power: &[f64], step: f64) -> Vec<Line> {
-    const MEDIAN: f64 = 0.454_936_423_119_572_8;
     // below, drift has its own shapes
     const FIRST: usize = 256;
     const BAND: f64 = 0.1;
@@ -32,7 +31,7 @@ pub fn find_lines(power: &[f64], step: f64) -> Vec<Line> {
         let mut sorted = power[around].to_vec();
         let middle = sorted.len() / 2;
         let (_, median, _) = sorted.select_nth_unstable_by(middle, f64::total_cmp);
-        let level = *median / MEDIAN;
+        let level = *median / CHI_SQUARE_1_MEDIAN;
         for (w, p) in whitened[first..first + size].iter_mut().zip(&power[first..first + size]) {
             *w = if level > 0.0 { p / level } else { 1.0 };
         }

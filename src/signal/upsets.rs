@@ -1,5 +1,6 @@
 //! What no stationary noise does: single samples far off, and steps of the level. Medians find them, so that they do not hide themselves.
 
+use super::check::robust;
 use crate::numerics::distribution::normal_quantile;
 
 /// Chance of calling anything in a log of normal noise an outlier, and likewise a step.
@@ -109,14 +110,10 @@ fn scale(values: &[f64]) -> f64 {
     (finite().map(|v| v * v).sum::<f64>() / finite().count().max(1) as f64).sqrt()
 }
 
-/// Of the finite values; 0 for none.
+/// Of the finite values; NaN for none.
 fn median(mut values: Vec<f64>) -> f64 {
     values.retain(|v| v.is_finite());
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        return 0.0;
-    }
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    robust::median(&mut values)
 }
 
 #[cfg(test)]

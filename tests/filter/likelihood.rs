@@ -75,6 +75,20 @@ fn likelihood_is_that_of_the_normal_vector() {
     }
 }
 
+/// A gap of 10¹⁵ samples costs no more than one of ten correlation times: what is before it says nothing of the drift behind it, so both give the
+/// same to 1e-4 of the variance that is left (e^−20 = 2e-9 of correlation, 700 samples).
+#[test]
+fn a_gap_of_years_is_one_step() {
+    let model = augment(Plant::Static, Quantity::AngularRate, &noise([true, false]), None, DT, 100.0).unwrap();
+    let [before, after]: [Vec<f64>; 2] = [0.7, 1.3].map(|f| (0..700).map(|k| (f * f64::from(k)).sin()).collect());
+    let value = |missing| {
+        let log = [Stretch { missing: 0, samples: &before }, Stretch { missing, samples: &after }];
+        diffuse_log_likelihood(&model, &log, false).value
+    };
+    let (long, short) = (value(1_000_000_000_000_000), value(50));
+    assert!((long - short).abs() < 1e-4 && long.is_finite(), "{long} {short}");
+}
+
 #[test]
 fn too_few_samples_have_no_likelihood() {
     let model = augment(Plant::Static, Quantity::AngularRate, &noise([true, false]), None, DT, 100.0).unwrap();

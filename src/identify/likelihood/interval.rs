@@ -2,9 +2,9 @@
 
 use nalgebra::DMatrix;
 
-use super::super::NORMAL_95;
 use super::ordinates::Ordinates;
 use super::whittle::{self, Fit};
+use crate::numerics::distribution::NORMAL_95;
 
 /// Standard deviation of a logarithm from which the likelihood is no parabola any more; of drift parameters, and of others.
 const ROUGH: [f64; 2] = [0.03, 0.15];

@@ -17,13 +17,14 @@ use super::selection::FIT_LEVEL;
 use super::shape::Role;
 use super::shape::document_name;
 use super::{
-    Candidate, Identified, IdentifyError, LENGTHS_TO_TELL, ModelChoice, NORMAL_95, Precision as Known, WIDEST_INTERVAL,
-    bias, entry, usable,
+    Candidate, Identified, IdentifyError, LENGTHS_TO_TELL, ModelChoice, Precision as Known, WIDEST_INTERVAL, bias,
+    entry, usable,
 };
 use crate::allan::{self, Deviation, TauGrid};
 use crate::consistency::spectrum::departure;
 use crate::filter::likelihood::Stretch;
 use crate::noise::{Kind, NoiseModel, Term};
+use crate::numerics::distribution::NORMAL_95;
 use crate::params::{AxisParams, NotIdentified};
 use crate::units::{Unit, digits};
 use exact::{Exact, Refined};
@@ -94,6 +95,7 @@ pub(super) fn identify(
 
     let words = Words { data: &data, display };
     let terms = known_terms(&data, fit, known);
+    let all_known = terms.len() == fit.form.pieces().len();
     let model = NoiseModel { terms: terms.iter().map(|found| found.term).collect() };
     let mut curve =
         allan::curve(rate, dt, Deviation::Oadev, TauGrid::Log(POINTS_PER_DECADE)).map_err(|e| failed(e.to_string()))?;
@@ -133,7 +135,8 @@ pub(super) fn identify(
         },
         precision: known_precision(&terms),
         time_profile: shared::TimeProfile::new(&data, on_cosines),
-        exact_log_likelihood: refined.map(|refined| refined.log_likelihood),
+        // of the parameters that are written, not of others
+        exact_log_likelihood: refined.filter(|_| all_known).map(|refined| refined.log_likelihood),
         warnings: words.warnings(fit, fit_p_value),
         model,
         candidates,

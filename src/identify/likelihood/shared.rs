@@ -3,12 +3,11 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::super::NORMAL_95;
 use super::super::shape::Role;
 use super::ordinates::Ordinates;
 use super::whittle::{self, Fit};
 use crate::noise::Kind;
-use crate::numerics::distribution::chi_square_sf;
+use crate::numerics::distribution::{NORMAL_95, chi_square_sf};
 
 /// The likelihood of one axis as a function of the correlation time of its only Gauss-Markov process.
 #[derive(Clone, Debug)]

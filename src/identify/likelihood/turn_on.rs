@@ -1,7 +1,7 @@
 //! How far the bias moves from one start to the next, from the biases of several logs.
 
-use super::super::NORMAL_95;
 use crate::filter::likelihood::LogLikelihood;
+use crate::numerics::distribution::NORMAL_95;
 use crate::params::Measured;
 use crate::units::Unit;
 

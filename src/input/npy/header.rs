@@ -327,7 +327,8 @@ impl Parser<'_> {
                 },
                 c if c == quote => {
                     self.rest = &self.rest[i + 1..];
-                    return Some(out);
+                    // names and types stand in messages of one line
+                    return Some(out.replace(char::is_control, "\u{fffd}"));
                 }
                 c => out.push(c),
             }

@@ -41,7 +41,7 @@ fn mix(index: u64) -> u64 {
 }
 
 /// Median; the mean of the two middle values for an even number. Reorders `x`; NaN for none.
-pub(super) fn median(x: &mut [f64]) -> f64 {
+pub(in crate::signal) fn median(x: &mut [f64]) -> f64 {
     let n = x.len();
     if n == 0 {
         return f64::NAN;

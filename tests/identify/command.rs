@@ -1,0 +1,123 @@
+//! The command `identify` says what the library finds, and refuses what it must.
+
+use kfdesign::filter::likelihood::Stretch;
+use kfdesign::identify::{ModelChoice, identify_logs};
+use kfdesign::params::{Params, TermEntry};
+use kfdesign::units::Unit;
+
+use super::{N, SIGMA, gauss_markov, log, white};
+use crate::support::{Bench, measured};
+
+/// Three axes in one log, the middle one with an unusable sample: the numbers of the command are those of the library.
+fn three_axis_log(bench: &Bench) -> Vec<Vec<f64>> {
+    let unit = Unit::parse("deg/s").unwrap();
+    let mut axes: Vec<Vec<f64>> = (0..3)
+        .map(|axis| {
+            let rate = log(&[white(N), gauss_markov(SIGMA, 20.0)], 3000, 0.1, 10, axis);
+            rate.iter().map(|x| (x + 0.1) * 1e6).map(|x| x.round() / 1e6).collect()
+        })
+        .collect();
+    let mut text = String::from("gyro_x (deg/s),gyro_y (deg/s),gyro_z (deg/s)\n");
+    for (k, ((x, y), z)) in axes[0].iter().zip(&axes[1]).zip(&axes[2]).enumerate() {
+        let y = if k == 1000 { f64::NAN } else { *y };
+        text += &format!("{x},{y},{z}\n");
+    }
+    bench.file("log.csv", text);
+    axes[1][1000] = f64::NAN;
+    axes.iter().map(|axis| axis.iter().map(|x| unit.to_si(*x)).collect()).collect()
+}
+
+#[test]
+fn command_writes_what_the_library_finds() {
+    let bench = Bench::new();
+    let axes = three_axis_log(&bench);
+    let out = bench.run("identify log.csv --rate 10 -o params.json --report r.html --plot p.svg --json");
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    assert!(
+        out.stderr.contains(
+            "gyro_y: the longest stretch without gaps and unusable samples chooses the terms: 1999 samples, 1001 left out"
+        ),
+        "{}",
+        out.stderr
+    );
+    assert_eq!(bench.files(), ["log.csv", "p.svg", "params.json", "r.html"]);
+    let document: serde_json::Value = serde_json::from_str(&out.stdout).unwrap();
+    let written: serde_json::Value = serde_json::from_str(&bench.read("params.json")).unwrap();
+    assert_eq!(document["params"], written);
+    let params = Params::read(&bench.path("params.json")).unwrap();
+    let unit = Unit::parse("deg/s").unwrap();
+    for (i, axis) in params.axes.iter().enumerate() {
+        let rate = if i == 1 { &axes[1][1001..] } else { &axes[i][..] };
+        let whole = [vec![Stretch { missing: 0, samples: &axes[i] }]];
+        let expected = identify_logs(&axis.name, rate, &whole, 0.1, &unit, &ModelChoice::Auto).unwrap();
+        assert_eq!(*axis, Params::from_json(&bench.read("params.json"), "p").unwrap().axes[i]);
+        assert_eq!(axis.terms.len(), expected.params.terms.len());
+        for (a, b) in axis.noise().terms.iter().zip(&expected.model.terms) {
+            let (a, b) = (a.allan_variance(7, 0.1), b.allan_variance(7, 0.1));
+            assert!((a / b - 1.0).abs() < 1e-6, "{}: {a} and {b}", axis.name);
+        }
+        assert!(
+            axis.terms
+                .iter()
+                .all(|t| !matches!(t, TermEntry::White { density } if density.unit.text() != "deg/s/sqrt(Hz)"))
+        );
+    }
+    let source = params.source.unwrap();
+    assert_eq!((source.method.as_deref(), source.samples), (Some("likelihood"), Some(3000)));
+    assert_eq!(source.log.as_deref(), Some("log.csv"));
+    assert_eq!(source.sha256.unwrap().len(), 64);
+    assert_eq!(document["axes"][1]["samples"], 1999);
+    assert!(bench.read("p.svg").contains("gyro_z"));
+    assert!(
+        bench.read("r.html").contains("What this log does not tell") || bench.read("r.html").contains("Parameters")
+    );
+    // same input, same bytes
+    let again = bench.run("identify log.csv --rate 10 --json");
+    assert_eq!(out.stdout, again.stdout);
+}
+
+#[test]
+fn command_shows_tables_and_refuses_what_it_must() {
+    let bench = Bench::new();
+    three_axis_log(&bench);
+    let text = bench.ok("identify log.csv --rate 10 --columns gyro_x");
+    for words in ["gyro_x: white", "angle random walk", "95 % from", "Candidates", "chosen"] {
+        assert!(text.contains(words), "{words}:\n{text}");
+    }
+    let text = bench.ok("identify log.csv --rate 10 --columns gyro_x --method graphical");
+    for words in ["The recipe, step by step", "minimum/0.664", "N/sqrt(dt)", "What each step costs"] {
+        assert!(text.contains(words), "{words}:\n{text}");
+    }
+    for (arguments, words) in [
+        ("identify log.csv --rate 10 -o log.csv", "log.csv: cannot write: it is the input file"),
+        ("identify log.csv --rate 10 --report ./log.csv", "it is the input file"),
+        ("identify log.csv --rate 10 --model white+x", "unknown term 'x'"),
+        ("identify log.csv --rate 10 --model white+gm --method graphical", "the graphical recipe has one model"),
+        ("identify log.csv --rate 10 --end 1 --columns gyro_x", "samples are too few to identify noise"),
+    ] {
+        let out = bench.run(arguments);
+        assert_eq!(out.status, 2, "{arguments}: {}", out.stderr);
+        let last = out.stderr.lines().last().unwrap();
+        assert!(last.contains(words), "{arguments}: {last}");
+        assert!(out.stdout.is_empty());
+    }
+    assert_eq!(bench.files(), ["log.csv"]);
+}
+
+/// The measured industrial gyro whose white density is known from its Allan deviation at 1 s (deg/s/√Hz, computed independently),
+/// band-limited: within 10 %, and the band limit is said.
+#[test]
+fn measured_gyro_has_its_known_density() {
+    let Some(path) = measured("static/SMAC-Group_imudata/adis16405_recording1.csv.gz") else { return };
+    let bench = Bench::new();
+    let command =
+        format!("identify {} --rate 100 --sensor gyro --method allan --model white+flicker+rrw --json", path.display());
+    let document: serde_json::Value = serde_json::from_str(&bench.ok(&command)).unwrap();
+    for (axis, known) in [0.0409, 0.0430, 0.0387].into_iter().enumerate() {
+        let density = document["params"]["axes"][axis]["white"]["density"]["value"].as_f64().unwrap();
+        assert!((density / known - 1.0).abs() < 0.1, "axis {axis}: {density}, not {known}");
+        assert!(document["axes"][axis]["first_tau_s"].as_f64().unwrap() > 0.05);
+        let warnings = document["axes"][axis]["warnings"].to_string();
+        assert!(warnings.contains("left out"), "{warnings}");
+    }
+}

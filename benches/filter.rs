@@ -9,7 +9,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use kfdesign::filter::gains::GainSequence;
 use kfdesign::filter::mismatch::expect;
 use kfdesign::filter::{Judge, Kalman};
-use kfdesign::model::{InitialBias, LinearModel, Plant, augment};
+use kfdesign::model::{InitialBias, LinearModel, sensor_errors};
 use kfdesign::noise::{NoiseModel, Term};
 use kfdesign::numerics::random::{StreamId, fill_normal, stream};
 use kfdesign::units::Quantity;
@@ -25,7 +25,7 @@ fn model(drifts: usize) -> LinearModel {
     let fast = Term::GaussMarkov { std_dev: 2e-4, correlation_time: 9.0 };
     let terms = [Term::White { density: 9.809e-4 }].into_iter().chain([slow, fast].into_iter().take(drifts)).collect();
     let bias = Some(InitialBias { mean: 0.0, std_dev: 1e-2 });
-    augment(Plant::Static, Quantity::AngularRate, &NoiseModel { terms }, bias, 0.01, 1e4).expect("a sound model")
+    sensor_errors(Quantity::AngularRate, &NoiseModel { terms }, bias, 0.01, 1e4).expect("a sound model")
 }
 
 fn measurements(model: &LinearModel) -> Vec<f64> {

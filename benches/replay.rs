@@ -28,6 +28,7 @@ fn axis(name: &str) -> AxisDesign {
         inputs: vec![],
         measurements: vec![named("rate")],
         every: vec![1],
+        outputs: vec![],
         f: DMatrix::from_diagonal(&DVector::from_row_slice(&[1.0, phi])),
         g: DMatrix::zeros(2, 0),
         h: DMatrix::from_row_slice(1, 2, &[1.0, 1.0]),
@@ -37,6 +38,7 @@ fn axis(name: &str) -> AxisDesign {
         p0: DMatrix::from_diagonal(&DVector::from_row_slice(&[1e-4, sigma * sigma])),
     };
     let steady_state = SteadyState {
+        period: 1,
         gain: DMatrix::zeros(2, 1),
         predicted_covariance: DMatrix::zeros(2, 2),
         innovation_covariance: DMatrix::zeros(1, 1),
@@ -72,6 +74,7 @@ fn bench(criterion: &mut Criterion) {
         quantity: Quantity::AngularRate,
         sample_rate_hz: 100.0,
         plant: "static".into(),
+        design: None,
         axes: names.iter().map(|n| axis(n)).collect(),
         tuning: serde_json::Value::Null,
     };

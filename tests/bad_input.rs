@@ -343,6 +343,88 @@ fn parameters_that_cannot_be_used() {
 }
 
 #[test]
+fn plants_that_cannot_be_tuned() {
+    /// The sound parameters with this design section.
+    fn row<'a>(what: &'a str, design: &str, words: &'a [&'a str]) -> Row<'a> {
+        let section = format!("\"design\": {design}, \"quantity\"");
+        (what, "params.json", params("\"quantity\"", &section), "tune params.json -o out.json", words)
+    }
+    fn flags<'a>(command: &'a str, words: &'a [&'a str]) -> Row<'a> {
+        (command, "params.json", params("x", "x"), command, words)
+    }
+    // two states of which only the first is seen, and the second moves
+    let unseen = r#"{"plant": "custom", "custom": {"time": "continuous", "sensor": "turn", "A": [[-1, 0], [0, 0]], "G": [[1, 0], [0, 1]],
+        "H": [[1, 0]], "states": [{"name": "turn", "unit": "rad/s", "std_dev": "1 rad/s"}, {"name": "slip", "unit": "m", "std_dev": "1 m"}],
+        "outputs": [{"name": "turn", "unit": "rad/s"}]}}"#;
+    let angle = r#"{"plant": "angle", "aids": [{"name": "heading", "std_dev": "2 deg", "rate": "1 Hz"}]}"#;
+    assert_refused(vec![
+        row(
+            "no such plant",
+            r#"{"plant": "rocket"}"#,
+            &["design.plant: unknown plant 'rocket'; known plants: static, angle"],
+        ),
+        row("unknown key", r#"{"plant": "angle", "aid": []}"#, &["design.aid: unknown key; did you mean 'aids'?"]),
+        row(
+            "key of another plant",
+            r#"{"plant": "angle", "motion": {}}"#,
+            &["design.motion: is no matter of the plant 'angle'"],
+        ),
+        row("no aid", r#"{"plant": "angle"}"#, &["axis 'x': nothing measures the angle; give an aid"]),
+        row(
+            "aid of nothing",
+            r#"{"plant": "static", "aids": [{"name": "a", "std_dev": "1 deg"}]}"#,
+            &["'static' has nothing to aid"],
+        ),
+        row(
+            "aid without noise",
+            &angle.replace("2 deg", "0 deg"),
+            &["design.aids[0].std_dev: 0 deg must be greater than zero"],
+        ),
+        row(
+            "aid in another unit",
+            &angle.replace("2 deg", "2 deg/s"),
+            &["design.aids[0].std_dev", "deg/s", "expected an angle"],
+        ),
+        row("aid of no rate", &angle.replace("1 Hz", "0 Hz"), &["design.aids[0].rate: 0 Hz must be greater than zero"]),
+        row("motion left out", r#"{"plant": "rate"}"#, &["design.motion: missing"]),
+        row("accelerometer left out", r#"{"plant": "vertical"}"#, &["design.accelerometer: missing"]),
+        row("unseen state", unseen, &["axis 'x': there is no steady state: slip reaches no measurement"]),
+        row(
+            "contradictory units",
+            &unseen.replace(r#""unit": "rad/s"}]}}"#, r#""unit": "m/s"}]}}"#),
+            &["sensor: 'turn' is in m/s, but the sensor measures in rad/s"],
+        ),
+        row("unit that is not SI", &unseen.replace("\"m\"", "\"km\""), &["states[1].unit", "'km' is not an SI unit"]),
+        row(
+            "matrix of another size",
+            &unseen.replace("[[1, 0]]", "[[1]]"),
+            &["design.custom.H: expected 1 rows of 2 numbers"],
+        ),
+        row(
+            "no sensor",
+            &unseen.replace("\"sensor\": \"turn\"", "\"sensor\": \"gyro\""),
+            &["'gyro' is neither an input nor an output"],
+        ),
+        row(
+            "state with the name of another",
+            &unseen.replace("slip", "bias"),
+            &["states[1].name: 'bias' is the name of a state of the sensor too"],
+        ),
+        flags("tune params.json --plant rocket -o out.json", &["--plant: unknown plant 'rocket'"]),
+        flags("tune params.json --plant angle -o out.json", &["nothing measures the angle", "--aid"]),
+        flags(
+            "tune params.json --plant angle --aid 2deg -o out.json",
+            &["--aid \"2deg\"", "expected a number and a unit"],
+        ),
+        flags("tune params.json --plant rate -o out.json", &["--plant rate", "--motion"]),
+        flags("tune params.json --plant vertical -o out.json", &["--plant vertical", "--accelerometer"]),
+        flags("tune params.json --plant custom -o out.json", &["--plant custom", "--plant FILE.json"]),
+        flags("tune params.json --plant none.json -o out.json", &["--plant none.json: cannot read"]),
+        flags("tune params.json --motion 5deg -o out.json", &["--motion is no matter of the plant 'static'"]),
+    ]);
+}
+
+#[test]
 fn plans_that_cannot_be_made() {
     fn row<'a>(flags: &'a str, words: &'a [&'a str]) -> Row<'a> {
         (flags, "params.json", params("x", "x"), flags, words)

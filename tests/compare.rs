@@ -43,6 +43,7 @@ pub fn params(terms: &[Term]) -> Params {
             terms: terms.iter().map(entry).collect(),
             not_identified: vec![],
         }],
+        design: None,
         source: None,
     }
 }

@@ -23,6 +23,7 @@ fn model(f: &[&[f64]], h: &[f64], q: &[&[f64]], r: f64, x0: &[f64], p0: &[&[f64]
         inputs: vec![],
         measurements: vec![named("rate")],
         every: vec![1],
+        outputs: vec![],
         f: matrix(f),
         g: DMatrix::zeros(n, 0),
         h: DMatrix::from_row_slice(1, n, h),

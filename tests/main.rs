@@ -21,6 +21,7 @@ mod montecarlo;
 mod noise;
 mod numerics;
 mod params;
+mod plants;
 mod replay;
 mod report;
 mod simulate;

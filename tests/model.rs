@@ -2,7 +2,7 @@
 
 use kfdesign::model::discretize::{angle_and_drift, van_loan};
 use kfdesign::model::observability::{observability, undriven_states};
-use kfdesign::model::{InitialBias, LinearModel, ModelError, Named, Plant, augment};
+use kfdesign::model::{InitialBias, LinearModel, ModelError, Named, sensor_errors};
 use kfdesign::noise::{NoiseModel, Term};
 use kfdesign::numerics::linalg::{cholesky_semidefinite, relative_to_diagonal};
 use kfdesign::units::Quantity;
@@ -24,6 +24,7 @@ fn model(f: &[&[f64]], h: &[f64], q: &[f64]) -> LinearModel {
         inputs: vec![],
         measurements: vec![named("rate".into())],
         every: vec![1],
+        outputs: vec![],
         f: DMatrix::from_fn(n, n, |i, j| f[i][j]),
         g: DMatrix::zeros(n, 0),
         h: DMatrix::from_row_slice(1, n, h),
@@ -258,14 +259,6 @@ fn check_names_the_part_that_does_not_fit() {
     }
 }
 
-#[test]
-fn a_plant_is_known_by_its_name() {
-    for plant in Plant::ALL {
-        assert_eq!(Plant::parse(plant.name()), Ok(plant));
-    }
-    assert_eq!(Plant::parse("rocket").unwrap_err().to_string(), "unknown plant 'rocket'; known plants: static");
-}
-
 fn bias(mean: f64, std_dev: f64) -> Option<InitialBias> {
     Some(InitialBias { mean, std_dev })
 }
@@ -283,7 +276,7 @@ fn augmentation_names_every_state_and_keeps_blocks_apart() {
             Term::Quantization { coefficient: 1e-6 },
         ],
     };
-    let model = augment(Plant::Static, Quantity::AngularRate, &noise, bias(0.01, 0.2), 0.1, 1e4).unwrap();
+    let model = sensor_errors(Quantity::AngularRate, &noise, bias(0.01, 0.2), 0.1, 1e4).unwrap();
     let states: Vec<(&str, &str)> = model.states.iter().map(|s| (s.name.as_str(), s.unit.as_str())).collect();
     assert_eq!(
         states,
@@ -312,7 +305,7 @@ fn augmentation_names_every_state_and_keeps_blocks_apart() {
     assert_eq!(model.q[(0, 0)], 0.0);
     assert!(model.check().is_ok());
 
-    let force = augment(Plant::Static, Quantity::SpecificForce, &noise, None, 0.1, 1e4).unwrap();
+    let force = sensor_errors(Quantity::SpecificForce, &noise, None, 0.1, 1e4).unwrap();
     assert_eq!((force.states[0].unit.as_str(), force.states[6].unit.as_str()), ("m/s", "m/s^3"));
     assert_eq!(force.states.len(), 7);
 }
@@ -327,7 +320,7 @@ fn augmented_model_has_the_autocovariance_of_its_terms() {
     ];
     let dt = 0.05;
     let noise = NoiseModel { terms: terms.clone() };
-    let model = augment(Plant::Static, Quantity::AngularRate, &noise, None, dt, 1e3).unwrap();
+    let model = sensor_errors(Quantity::AngularRate, &noise, None, dt, 1e3).unwrap();
     // P0 of a stationary process is stationary: P = F P Fᵀ + Q.
     let next = &model.f * &model.p0 * model.f.transpose() + &model.q;
     assert!(relative_to_diagonal(&(&next - &model.p0), model.p0.diagonal().as_slice()) < 1e-14);
@@ -348,7 +341,7 @@ fn augmented_model_has_the_autocovariance_of_its_terms() {
 fn augmentation_refuses_what_no_filter_can_use() {
     let drift = NoiseModel { terms: vec![Term::GaussMarkov { std_dev: 1e-3, correlation_time: 3.0 }] };
     let built = |noise: &NoiseModel, dt, std_dev| {
-        augment(Plant::Static, Quantity::AngularRate, noise, bias(0.0, std_dev), dt, 1e3).map_err(|e| e.to_string())
+        sensor_errors(Quantity::AngularRate, noise, bias(0.0, std_dev), dt, 1e3).map_err(|e| e.to_string())
     };
     assert_eq!(
         built(&drift, 0.1, 1.0).unwrap_err(),
@@ -364,7 +357,7 @@ fn augmentation_refuses_what_no_filter_can_use() {
 #[test]
 fn a_chain_of_drifts_for_flicker_is_observable_to_its_last_state() {
     let noise = NoiseModel { terms: vec![Term::White { density: 1e-3 }, Term::BiasInstability { coefficient: 1e-4 }] };
-    let model = augment(Plant::Static, Quantity::AngularRate, &noise, bias(0.0, 1e-2), 0.01, 1e5).unwrap();
+    let model = sensor_errors(Quantity::AngularRate, &noise, bias(0.0, 1e-2), 0.01, 1e5).unwrap();
     let found = observability(&model).unwrap();
     assert!(model.states.len() > 8, "{}", model.states.len());
     assert_eq!((found.rank, found.unobservable.len()), (model.states.len(), 0), "condition {:e}", found.condition);

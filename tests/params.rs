@@ -109,6 +109,7 @@ fn writing_and_reading_gives_the_same_document() {
                 not_identified: vec![NotIdentified { term: "white".into(), reason: "why".into(), needed_log_s: None }],
             },
         ],
+        design: None,
         source: Some(Source {
             log: Some("a \"log\".csv".into()),
             samples: Some(u64::MAX),

@@ -26,6 +26,7 @@ fn axis(name: &str, dt: f64, q: f64, phi: f64, r: f64, x0: [f64; 2], p0: [f64; 2
         inputs: vec![],
         measurements: vec![named("rate")],
         every: vec![1],
+        outputs: vec![],
         f: DMatrix::from_diagonal(&DVector::from_row_slice(&[1.0, phi])),
         g: DMatrix::zeros(2, 0),
         h: DMatrix::from_row_slice(1, 2, &[1.0, 1.0]),
@@ -43,6 +44,7 @@ fn axis(name: &str, dt: f64, q: f64, phi: f64, r: f64, x0: [f64; 2], p0: [f64; 2
         name: name.into(),
         model,
         steady_state: SteadyState {
+            period: 1,
             gain: DMatrix::from_row_slice(2, 1, &[0.0, gain]),
             predicted_covariance: DMatrix::from_diagonal(&DVector::from_row_slice(&[0.0, predicted])),
             innovation_covariance: DMatrix::from_element(1, 1, predicted + r),
@@ -60,6 +62,7 @@ fn design(axes: Vec<AxisDesign>) -> FilterDesign {
         quantity: Quantity::AngularRate,
         sample_rate_hz: 1.0 / axes[0].model.dt,
         plant: "static".into(),
+        design: None,
         axes,
         tuning: serde_json::Value::Null,
     }

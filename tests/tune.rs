@@ -42,6 +42,7 @@ fn sensor(rate_hz: f64, terms: Vec<TermEntry>, turn_on: Option<f64>) -> Params {
             terms,
             not_identified: vec![],
         }],
+        design: None,
         source: None,
     }
 }

@@ -210,6 +210,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         quantity: recording.quantity,
         sample_rate_hz: recording.sample_rate_hz,
         axes: axes.iter().map(|a| a.found.params.clone()).collect(),
+        design: None,
         source: Some(Source {
             log: Some(args.logs.iter().map(|log| file_name(log)).collect::<Vec<_>>().join(", ")),
             sha256: recording.sha256.clone().filter(|_| readings.len() == 1),

@@ -1,5 +1,6 @@
 //! `kfdesign tune`.
 
+mod plant_flags;
 mod sight;
 mod text;
 mod truth;
@@ -10,13 +11,13 @@ use anyhow::Context;
 use serde::Serialize;
 use serde_json::json;
 
+use self::plant_flags::PlantFlags;
 use super::Status;
 use super::log_flags::{LogFlags, print_check};
 use super::output::{print_json, print_text, progress};
 use crate::consistency::Verdict;
 use crate::export::atomic;
 use crate::input::{Block, LogReader};
-use crate::model::Plant;
 use crate::montecarlo::{Outcome, Plan, verify};
 use crate::params::Params;
 use crate::replay::{LogShape, Options, ReplayResult, Replayer};
@@ -34,9 +35,6 @@ pub struct Args {
     /// The design: filter.json
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// What the sensor is part of
-    #[arg(long, default_value = "static", value_name = "PLANT")]
-    plant: String,
     /// Slowest time constant that the states for flicker cover
     #[arg(long, default_value_t = TuneOptions::default().flicker_horizon_s, value_name = "SECONDS")]
     flicker_horizon: f64,
@@ -62,6 +60,8 @@ pub struct Args {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
+    plant: PlantFlags,
+    #[command(flatten)]
     reading: LogFlags,
 }
 
@@ -85,8 +85,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     }
     let params = Params::read(&args.params)?;
     let name = args.params.display().to_string();
-    let options =
-        TuneOptions { plant: Plant::parse(&args.plant).context("--plant")?, flicker_horizon_s: args.flicker_horizon };
+    let options = TuneOptions { design: args.plant.design(&params)?, flicker_horizon_s: args.flicker_horizon };
     let mut tuned = tune(&params, &options).with_context(|| name.clone())?;
     let truth = args.truth.as_deref().map(|path| Truth::read(path, &tuned, &options)).transpose()?;
     let plan = Plan { runs: args.runs, seed: args.seed, ..Plan::quick(params.sample_rate_hz) };

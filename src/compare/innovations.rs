@@ -37,7 +37,7 @@ pub(super) fn innovations(
     let si = |value: f64| Some(Measured::from_si(value, None, unit.clone()));
     let axis = AxisParams { bias: si(level), turn_on_bias: si(10.0 * spread), ..axis.clone() };
     let name = axis.name.clone();
-    let params = Params { quantity, sample_rate_hz: rate_hz, axes: vec![axis], source: None };
+    let params = Params { quantity, sample_rate_hz: rate_hz, axes: vec![axis], design: None, source: None };
     let design = tune(&params, &TuneOptions::default()).map_err(|e| e.to_string())?.design;
     let shape = LogShape { axes: vec![name], quantity, sample_rate_hz: rate_hz };
     let mut replayer = Replayer::new(&design, &shape, Options { alpha, gate: None }).map_err(|e| e.to_string())?;

@@ -10,7 +10,7 @@ use serde_json::Value;
 pub use super::steady_state::SteadyState;
 use super::{reading, rows};
 use crate::model::{LinearModel, Named};
-use crate::params::{AxisParams, Measured, place};
+use crate::params::{AxisParams, Design, Measured, place};
 use crate::units::Quantity;
 
 /// The filter of one axis with its steady state and origin.
@@ -28,8 +28,10 @@ pub struct AxisDesign {
 pub struct FilterDesign {
     pub quantity: Quantity,
     pub sample_rate_hz: f64,
-    /// "static".
+    /// "static", "angle", "rate", "vertical" or "custom".
     pub plant: String,
+    /// The plant and its aids as documented; absent for a sensor at rest.
+    pub design: Option<Design>,
     pub axes: Vec<AxisDesign>,
     /// Free-form record of the tuning: method, objective, what moved and by how much.
     pub tuning: Value,
@@ -104,8 +106,11 @@ struct FilterDocument {
     /// Frequency, for example "100 Hz".
     #[schemars(with = "Measured")]
     sample_rate: InUnit,
-    /// What is measured beside the sensor's own errors: "static".
+    /// What is measured beside the sensor's own errors: "static", "angle", "rate", "vertical" or "custom".
     plant: String,
+    /// The plant and its aids, as in params.json.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    design: Option<Design>,
     #[schemars(length(min = 1))]
     axes: Vec<AxisDocument>,
     /// Method, objective, what moved and by how much.
@@ -135,6 +140,9 @@ struct AxisDocument {
     inputs: Vec<NamedDocument>,
     /// In the order of z.
     measurements: Vec<MeasurementDocument>,
+    /// What the filter is for: the states of the plant and the sensor's drift, as combinations of states.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    outputs: Vec<OutputDocument>,
     /// Transition, states by states.
     #[serde(rename = "F")]
     f: Matrix,
@@ -184,22 +192,45 @@ struct MeasurementDocument {
     every: usize,
 }
 
+#[derive(Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "Output")]
+struct OutputDocument {
+    name: String,
+    /// SI unit.
+    unit: String,
+    /// One number per state.
+    row: Vec<f64>,
+}
+
 fn one() -> usize {
     1
 }
 
-/// The filter after a long time.
+fn first(period: &u64) -> bool {
+    *period == 1
+}
+
+fn every_sample() -> u64 {
+    1
+}
+
+/// The filter after a long time, at a sample at which every measurement is taken.
 #[derive(Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "SteadyState")]
 struct SteadyStateDocument {
+    /// Samples after which the pattern of measurements repeats.
+    #[serde(default = "every_sample", skip_serializing_if = "first")]
+    #[schemars(range(min = 1))]
+    period: u64,
     /// K, states by measurements.
     gain: Matrix,
     /// P(k|k-1).
     predicted_covariance: Matrix,
     /// S.
     innovation_covariance: Matrix,
-    /// Eigenvalues of (I - K H) F as [re, im].
+    /// Eigenvalues of (I - K H) F as [re, im]; with a longer period the principal roots, per sample, of those of a whole period.
     poles: Vec<[f64; 2]>,
     /// Four time constants of the slowest closed-loop pole of the driven states.
     #[schemars(with = "Measured")]
@@ -225,6 +256,7 @@ impl From<&FilterDesign> for FilterDocument {
             quantity: design.quantity,
             sample_rate: InUnit { value: design.sample_rate_hz, unit: "Hz" },
             plant: design.plant.clone(),
+            design: design.design.clone(),
             axes: design.axes.iter().map(AxisDocument::from).collect(),
             tuning: design.tuning.clone(),
         }
@@ -242,6 +274,11 @@ impl From<&AxisDesign> for AxisDocument {
             measurements: measurements
                 .map(|(m, &every)| MeasurementDocument { name: m.name.clone(), unit: m.unit.clone(), every })
                 .collect(),
+            outputs: model
+                .outputs
+                .iter()
+                .map(|o| OutputDocument { name: o.name.clone(), unit: o.unit.clone(), row: o.row.clone() })
+                .collect(),
             f: rows_of(&model.f),
             g: rows_of(&model.g),
             h: rows_of(&model.h),
@@ -258,6 +295,7 @@ impl From<&AxisDesign> for AxisDocument {
 impl From<&SteadyState> for SteadyStateDocument {
     fn from(steady: &SteadyState) -> Self {
         SteadyStateDocument {
+            period: steady.period,
             gain: rows_of(&steady.gain),
             predicted_covariance: rows_of(&steady.predicted_covariance),
             innovation_covariance: rows_of(&steady.innovation_covariance),

@@ -34,6 +34,7 @@ pub struct Kalman {
     /// Hᵀ, so that the row of one measurement is contiguous.
     h_columns: DMatrix<f64>,
     q: DMatrix<f64>,
+    g: DMatrix<f64>,
     r: Vec<f64>,
     scratch: Scratch,
 }
@@ -62,6 +63,7 @@ impl Kalman {
         assert_eq!(model.p0.shape(), (n, n), "P0");
         assert_eq!(model.h.ncols(), n, "H");
         assert_eq!(model.r.shape(), (m, m), "R");
+        assert_eq!(model.g.nrows(), n, "G");
         Kalman {
             x: model.x0.clone(),
             p: model.p0.clone(),
@@ -69,6 +71,7 @@ impl Kalman {
             sparse: SparseTransition::new(&model.f),
             h_columns: model.h.transpose(),
             q: model.q.clone(),
+            g: model.g.clone(),
             r: model.r.diagonal().iter().copied().collect(),
             scratch: Scratch {
                 vector: vec![0.0; n],
@@ -88,6 +91,14 @@ impl Kalman {
         match &self.sparse {
             Some(sparse) => sparse.predict(q, x, p, vector, matrix),
             None => for_size!(x.len(), predict_kernel(f, q, x, p, vector, matrix)),
+        }
+    }
+
+    /// x ← x + G u: after [`predict`](Kalman::predict), what the inputs of the sample before have done. Inputs are known exactly: the
+    /// noise of a sensor at an input is part of Q.
+    pub fn drive(&mut self, u: &[f64]) {
+        for (column, u) in self.g.column_iter().zip(u) {
+            self.x.axpy(*u, &column, 1.0);
         }
     }
 

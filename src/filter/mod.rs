@@ -15,6 +15,7 @@ macro_rules! for_size {
     };
 }
 
+pub mod cycle;
 pub mod document;
 pub mod gains;
 pub mod judge;
@@ -26,6 +27,7 @@ pub(crate) mod rows;
 pub mod steady_state;
 mod transition;
 
+pub use cycle::Cycle;
 pub use document::{AxisDesign, FilterDesign, FilterError};
 pub use gains::GainSequence;
 pub use judge::Judge;

@@ -5,9 +5,9 @@ use serde_json::Value;
 
 use super::document::{AxisDesign, FORMAT, FilterDesign};
 use super::steady_state::{SteadyState, steady_state};
-use crate::model::{LinearModel, ModelError, Named, Plant};
+use crate::model::{LinearModel, ModelError, Named, Output};
 use crate::params::place::{KeyError, Object, Place};
-use crate::params::{self, AxisParams, Measured, Range};
+use crate::params::{self, AxisParams, Design, Measured, PLANTS, Range};
 use crate::units::{Dimension, Quantity, Unit, digits};
 
 /// A steady state whose gain differs by more than this, relative to the largest gain, belongs to another model.
@@ -15,13 +15,21 @@ const GAIN_TOLERANCE: f64 = 1e-6;
 
 /// The whole document.
 pub(super) fn design(root: &Place<'_>) -> Result<FilterDesign, KeyError> {
-    let known = ["format", "quantity", "sample_rate", "plant", "axes", "tuning"];
+    let known = ["format", "quantity", "sample_rate", "plant", "design", "axes", "tuning"];
     let object = root.document(FORMAT, "a filter file", &known)?;
     let quantity = params::quantity(&object.required("quantity")?)?;
     let rate = Measured::from_place(&object.required("sample_rate")?, Dimension::FREQUENCY, Range::Positive)?;
     let sample_rate_hz = rate.si();
     let plant_place = object.required("plant")?;
-    let plant = Plant::parse(plant_place.text()?).map_err(|e| plant_place.error(e.to_string()))?;
+    let name = plant_place.text()?;
+    let plant =
+        PLANTS.into_iter().find(|p| *p == name).ok_or_else(|| plant_place.error(params::unknown_plant(name)))?;
+    let section =
+        object.optional("design").map(|place| Ok((place.clone(), Design::from_place(&place)?))).transpose()?;
+    if let Some((place, design)) = section.as_ref().filter(|(_, design)| design.plant.name() != plant) {
+        return Err(place.error(format!("is of the plant '{}', the filter of '{plant}'", design.plant.name())));
+    }
+    let design = section.map(|(_, design)| design);
     let list = object.required("axes")?;
     let mut axes: Vec<AxisDesign> = Vec::new();
     for place in list.list()? {
@@ -36,15 +44,16 @@ pub(super) fn design(root: &Place<'_>) -> Result<FilterDesign, KeyError> {
         return Err(list.error("there is no axis; at least one is needed"));
     }
     let tuning = object.optional("tuning").map_or(Value::Null, |place| place.value().clone());
-    Ok(FilterDesign { quantity, sample_rate_hz, plant: plant.name().to_owned(), axes, tuning })
+    Ok(FilterDesign { quantity, sample_rate_hz, plant: plant.to_owned(), design, axes, tuning })
 }
 
-fn axis(place: &Place<'_>, quantity: Quantity, plant: Plant, dt: f64) -> Result<AxisDesign, KeyError> {
+fn axis(place: &Place<'_>, quantity: Quantity, plant: &str, dt: f64) -> Result<AxisDesign, KeyError> {
     let object = place.object(&[
         "name",
         "states",
         "inputs",
         "measurements",
+        "outputs",
         "F",
         "G",
         "H",
@@ -80,7 +89,7 @@ fn axis(place: &Place<'_>, quantity: Quantity, plant: Plant, dt: f64) -> Result<
 }
 
 /// The matrices as they stand; [`LinearModel::check`] judges them.
-fn model(object: &Object<'_>, quantity: Quantity, plant: Plant, dt: f64) -> Result<LinearModel, KeyError> {
+fn model(object: &Object<'_>, quantity: Quantity, plant: &str, dt: f64) -> Result<LinearModel, KeyError> {
     let states = named_list(&object.required("states")?)?;
     let inputs = object.optional("inputs").map_or(Ok(Vec::new()), |place| inputs(&place, plant))?;
     let (mut measurements, mut every) = (Vec::new(), Vec::new());
@@ -91,6 +100,8 @@ fn model(object: &Object<'_>, quantity: Quantity, plant: Plant, dt: f64) -> Resu
         every.push(usize::try_from(count).unwrap_or(usize::MAX));
     }
     check_measurements(&object.required("measurements")?, &measurements, quantity, plant)?;
+    let outputs = object.optional("outputs").map_or(Ok(Vec::new()), |place| place.list())?;
+    let outputs = outputs.iter().map(output).collect::<Result<Vec<_>, _>>()?;
     let required = |key: &str| matrix(&object.required(key)?);
     let n = states.len();
     Ok(LinearModel {
@@ -106,16 +117,28 @@ fn model(object: &Object<'_>, quantity: Quantity, plant: Plant, dt: f64) -> Resu
         inputs,
         measurements,
         every,
+        outputs,
     })
 }
 
-fn inputs(place: &Place<'_>, plant: Plant) -> Result<Vec<Named>, KeyError> {
+/// A sensor at rest and one that measures a rate have no input, one that is integrated has one; a custom plant has any.
+fn inputs(place: &Place<'_>, plant: &str) -> Result<Vec<Named>, KeyError> {
     let inputs = named_list(place)?;
-    let expected = plant.inputs().len();
+    let expected = match plant {
+        "static" | "rate" => 0,
+        "angle" | "vertical" => 1,
+        _ => inputs.len(),
+    };
     if inputs.len() != expected {
-        return Err(place.error(format!("found {}; the plant '{}' has {expected}", inputs.len(), plant.name())));
+        return Err(place.error(format!("found {}; the plant '{plant}' has {expected}", inputs.len())));
     }
     Ok(inputs)
+}
+
+fn output(place: &Place<'_>) -> Result<Output, KeyError> {
+    let entry = place.object(&["name", "unit", "row"])?;
+    let Named { name, unit } = named(&entry)?;
+    Ok(Output { name, unit, row: numbers(&entry.required("row")?)? })
 }
 
 /// G may be left out or be `[]` when there are no inputs.
@@ -124,26 +147,28 @@ fn input_matrix(place: Option<Place<'_>>, n: usize, inputs: usize) -> Result<DMa
     Ok(if g.is_empty() && inputs == 0 { DMatrix::zeros(n, 0) } else { g })
 }
 
-/// The plant says how many measurements there are and of what dimension.
+/// The plant says of what dimension the measurements are, and of a sensor at rest that there is one.
 fn check_measurements(
     place: &Place<'_>,
     measurements: &[Named],
     quantity: Quantity,
-    plant: Plant,
+    plant: &str,
 ) -> Result<(), KeyError> {
-    let expected = plant.measurements(quantity);
-    if measurements.len() != expected.len() {
-        return Err(place.error(format!(
-            "found {} measurements; the plant '{}' has {}",
-            measurements.len(),
-            plant.name(),
-            expected.len()
-        )));
+    if plant == "static" && measurements.len() != 1 {
+        return Err(place.error(format!("found {} measurements; the plant 'static' has 1", measurements.len())));
     }
-    for (i, (found, expected)) in measurements.iter().zip(&expected).enumerate() {
-        if Unit::parse(&found.unit).map(|u| u.dimension()) != Unit::parse(&expected.unit).map(|u| u.dimension()) {
+    let allowed: &[&str] = match plant {
+        "static" => &[quantity.si_unit()],
+        "angle" => &["rad"],
+        "rate" => &["rad/s"],
+        "vertical" => &["rad", "m/s^2"],
+        _ => return Ok(()),
+    };
+    let dimension = |text: &str| Unit::parse(text).map(|u| u.dimension());
+    for (i, found) in measurements.iter().enumerate() {
+        if allowed.iter().all(|unit| dimension(unit) != dimension(&found.unit)) {
             let key = format!("{}[{i}].unit", place.key());
-            return Err(KeyError { key, message: format!("found {}; expected {}", found.unit, expected.unit) });
+            return Err(KeyError { key, message: format!("found {}; expected {}", found.unit, allowed.join(" or ")) });
         }
     }
     Ok(())
@@ -200,6 +225,7 @@ fn steady(object: &Object<'_>, axis: &Place<'_>, model: &LinearModel) -> Result<
 
 fn documented_steady_state(place: &Place<'_>, n: usize, m: usize) -> Result<SteadyState, KeyError> {
     let entry = place.object(&[
+        "period",
         "gain",
         "predicted_covariance",
         "innovation_covariance",
@@ -227,7 +253,9 @@ fn documented_steady_state(place: &Place<'_>, n: usize, m: usize) -> Result<Stea
         return Err(settling.error(format!("found {settling_time} s; a time cannot be negative")));
     }
     let figure = |key: &str| entry.optional(key).map_or(Ok(f64::NAN), |place| place.number());
+    let period = entry.optional("period").map_or(Ok(1), |place| place.count())?;
     Ok(SteadyState {
+        period: period.max(1),
         gain: sized("gain", n, m)?,
         predicted_covariance: sized("predicted_covariance", n, n)?,
         innovation_covariance: sized("innovation_covariance", m, m)?,

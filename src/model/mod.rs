@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::noise::TooFast;
 use crate::numerics::linalg::{cholesky, cholesky_semidefinite, relative_to_diagonal};
 
-pub use augment::{InitialBias, augment};
+pub use augment::{Attached, Augmented, InitialBias, Port, aid_errors, augment, sensor_errors};
 pub use plant::Plant;
 
 /// Largest asymmetry of a covariance, relative to √(P_ii P_jj), that counts as rounding of a printed number.
@@ -25,6 +25,18 @@ pub struct Named {
     pub unit: String,
 }
 
+/// A named combination of states, SI.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Output {
+    pub name: String,
+    pub unit: String,
+    /// One number per state.
+    pub row: Vec<f64>,
+}
+
+/// Name of the output that is the drift of the sensor.
+pub const DRIFT: &str = "drift";
+
 /// A named discrete-time linear model x_{k+1} = F x_k + G u_k + v, z_k = H x_k + w, v ~ N(0,Q), w ~ N(0,R), x_0 ~ N(x0, P0). SI.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearModel {
@@ -34,6 +46,8 @@ pub struct LinearModel {
     pub measurements: Vec<Named>,
     /// Measurement taken every n-th sample, per measurement.
     pub every: Vec<usize>,
+    /// What the filter is for: the plant's states and the sensor's drift. Empty for a sensor at rest: its drift alone.
+    pub outputs: Vec<Output>,
     pub f: DMatrix<f64>,
     pub g: DMatrix<f64>,
     pub h: DMatrix<f64>,
@@ -51,8 +65,6 @@ pub enum ModelError {
     Part { part: String, message: String },
     #[error("there is no white noise: a filter needs a measurement noise density greater than zero")]
     NoMeasurementNoise,
-    #[error("unknown plant '{found}'; known plants: {known}")]
-    UnknownPlant { found: String, known: String },
     #[error(transparent)]
     TooFast(#[from] TooFast),
     #[error("{name} is {value}; expected a number greater than zero")]
@@ -66,9 +78,12 @@ impl ModelError {
 }
 
 impl LinearModel {
-    /// The first row of H without quantisation, moving averages and oscillations, which are noise of the measurement although they
-    /// need states: times x it is the whole drift, which is subtracted from a measurement.
+    /// Times x it is the whole drift of the sensor, which is subtracted from what it measures: the output "drift"; where there is none,
+    /// the first row of H without quantisation, moving averages and oscillations, which are noise although they need states.
     pub fn drift_row(&self) -> DMatrix<f64> {
+        if let Some(output) = self.outputs.iter().find(|output| output.name == DRIFT) {
+            return DMatrix::from_row_slice(1, output.row.len(), &output.row);
+        }
         let kinds = ["quantization", "moving_average", "oscillation"];
         let noise = |j: usize| kinds.iter().any(|kind| self.states[j].name.starts_with(kind));
         DMatrix::from_fn(1, self.states.len(), |_, j| if noise(j) { 0.0 } else { self.h[(0, j)] })
@@ -118,6 +133,12 @@ impl LinearModel {
         }
         if let Some(i) = self.x0.iter().position(|v| !v.is_finite()) {
             return Err(ModelError::part(format!("x0[{i}]"), format!("{} is not a finite number", self.x0[i])));
+        }
+        for (i, output) in self.outputs.iter().enumerate() {
+            if output.row.len() != n || output.row.iter().any(|v| !v.is_finite()) {
+                let message = format!("found {} numbers; expected {n} finite ones, one per state", output.row.len());
+                return Err(ModelError::part(format!("outputs[{i}].row"), message));
+            }
         }
         for (letter, matrix) in [("Q", &self.q), ("R", &self.r), ("P0", &self.p0)] {
             check_covariance(letter, matrix)?;

@@ -12,6 +12,9 @@ pub const MARGINAL: f64 = 1e-12;
 /// Singular values below this fraction of the largest are rounding.
 const RANK_TOLERANCE: f64 = 1e-12;
 
+/// Powers of F are taken up to this size.
+const LARGEST_POWER: f64 = 1e60;
+
 /// Result of [`observability`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Observability {
@@ -29,8 +32,9 @@ pub struct Observability {
     pub sentences: Vec<String>,
 }
 
-/// Rank, condition and unobservable directions from the singular values of the observability matrix with rows H F^j for
-/// j = 0, 1, …, n − 1 and then 1, 2, 4, 8 … up to four times the slowest time constant, each column scaled to length one.
+/// Rank, condition and unobservable directions from the singular values of the observability matrix with rows h F^j/√r for
+/// j = 0, 1, …, n − 1 and then 1, 2, 4, 8 … up to four times the slowest time constant, j counting the samples at which the measurement
+/// is taken, each column scaled to length one.
 ///
 /// Rows that far apart are needed because consecutive samples of a slow drift and of a constant look alike to rounding.
 /// Errors: entries that are not finite.
@@ -39,7 +43,7 @@ pub fn observability(model: &LinearModel) -> Result<Observability, LinalgError> 
     let n = model.states.len();
     let slowest = slowest_decay(&model.f);
     let span_steps = slowest.map_or(n as f64, |steps| (4.0 * steps).max(n as f64));
-    let rows = observability_rows(&model.f, &model.h, span_steps);
+    let rows = observability_rows(model, span_steps);
 
     let norms: Vec<f64> = (0..n).map(|j| rows.column(j).norm()).collect();
     let scaled = DMatrix::from_fn(rows.nrows(), n, |i, j| if norms[j] > 0.0 { rows[(i, j)] / norms[j] } else { 0.0 });
@@ -115,21 +119,28 @@ fn slowest_decay(f: &DMatrix<f64>) -> Option<f64> {
         .max_by(f64::total_cmp)
 }
 
-fn observability_rows(f: &DMatrix<f64>, h: &DMatrix<f64>, span_steps: f64) -> DMatrix<f64> {
-    let n = f.nrows();
-    let mut blocks = vec![h.clone()];
-    for j in 1..n {
-        blocks.push(&blocks[j - 1] * f);
+/// Every measurement at its own rate, each in units of its own noise.
+fn observability_rows(model: &LinearModel, span_steps: f64) -> DMatrix<f64> {
+    let n = model.f.nrows();
+    let mut rows = Vec::new();
+    for (i, &every) in model.every.iter().enumerate() {
+        let between = model.f.pow(every.min(u32::MAX as usize) as u32);
+        let h = model.h.row(i) / model.r[(i, i)].sqrt();
+        let mut row = h.clone_owned();
+        for _ in 0..n {
+            rows.push(row.clone());
+            row = &row * &between;
+        }
+        let mut power = between;
+        let mut steps = every as f64;
+        // what grows for ever is seen long before its numbers overflow
+        while steps < span_steps && power.amax() < LARGEST_POWER {
+            power = &power * &power;
+            steps *= 2.0;
+            rows.push(&h * &power);
+        }
     }
-    let mut power = f.clone();
-    let mut steps = 1.0;
-    while steps < span_steps {
-        power = &power * &power;
-        steps *= 2.0;
-        blocks.push(h * &power);
-    }
-    let m = h.nrows();
-    DMatrix::from_fn(m * blocks.len(), n, |i, j| blocks[i / m][(i % m, j)])
+    DMatrix::from_fn(rows.len(), n, |i, j| rows[i][j])
 }
 
 /// Null-space basis in reduced echelon form, so that a direction names as few states as possible.
@@ -194,25 +205,48 @@ fn direction_in_words(direction: &[(String, f64)]) -> String {
     if let [(name, _)] = direction {
         return format!("{name} reaches no measurement: nothing reduces its variance.");
     }
+    let (names, change) = in_words(direction);
+    format!(
+        "{names} cannot be told apart: a change of {change} leaves every measurement as it was; what the measurement sees of them together is \
+         estimated, the split rests on P0."
+    )
+}
+
+/// A direction that no measurement sees and that noise drives, in words.
+pub fn undetermined(direction: &[(String, f64)]) -> String {
+    if let [(name, _)] = direction {
+        return format!(
+            "{name} reaches no measurement and its variance grows for ever; add a measurement (an aid) that sees it"
+        );
+    }
+    let (names, change) = in_words(direction);
+    format!(
+        "{names} cannot be told apart: a change of {change} leaves every measurement as it was, and noise drives it; add a measurement (an \
+         aid) that sees one of them"
+    )
+}
+
+/// The states of a direction and how they change, SI.
+fn in_words(direction: &[(String, f64)]) -> (String, String) {
     let names: Vec<&str> = direction.iter().map(|(name, _)| name.as_str()).collect();
     let change: Vec<String> = direction
         .iter()
         .map(|(name, v)| format!("{}{} in {name}", if *v < 0.0 { "−" } else { "+" }, digits(v.abs())))
         .collect();
-    format!(
-        "{} cannot be told apart: a change of {} leaves every measurement as it was; what the measurement sees of them together is \
-         estimated, the split rests on P0.",
-        names.join(" and "),
-        change.join(", ")
-    )
+    (names.join(" and "), change.join(", "))
 }
 
-/// How long it takes to tell a constant from each first-order drift that is seen by the same measurement: the mean of the
+/// How long it takes, at best, to tell a constant from each first-order drift that acts where it acts: the mean of the
 /// drift over T has variance 2σ²Tc/T for T ≫ Tc, so the constant is known to σ/2 after 8 Tc and to σ/10 after 200 Tc.
 fn told_apart(model: &LinearModel, constant: &str) -> Vec<String> {
     let n = model.states.len();
+    let Some(c) = model.states.iter().position(|state| state.name == constant) else { return Vec::new() };
     let first_order = |i: usize| (0..n).all(|j| j == i || model.f[(i, j)] == 0.0);
-    let seen = |i: usize| model.h.column(i).iter().any(|h| *h != 0.0);
+    let seen = |i: usize| {
+        let acts = model.h.column(i).iter().any(|h| *h != 0.0) || (0..n).any(|k| k != i && model.f[(k, i)] != 0.0);
+        acts && model.h.column(i) == model.h.column(c)
+            && (0..n).all(|k| k == i || k == c || model.f[(k, i)] == model.f[(k, c)])
+    };
     let mut lines = Vec::new();
     for i in (0..n).filter(|&i| first_order(i) && seen(i) && model.q[(i, i)] > 0.0) {
         let pole = model.f[(i, i)];

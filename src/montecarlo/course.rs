@@ -249,11 +249,12 @@ pub(super) fn own_models(design: &FilterDesign) -> Vec<LinearModel> {
     design.axes.iter().map(|axis| axis.model.clone()).collect()
 }
 
-/// The model of parameters at the rate of a filter.
+/// The model of parameters at the rate of a filter and in its plant.
 pub(super) fn model_of(
     axis: &crate::params::AxisParams,
     design: &FilterDesign,
 ) -> Result<LinearModel, MonteCarloError> {
-    sensor_model(axis, design.quantity, 1.0 / design.sample_rate_hz, &TuneOptions::default())
+    let options = TuneOptions { design: design.design.clone(), ..TuneOptions::default() };
+    sensor_model(axis, design.quantity, 1.0 / design.sample_rate_hz, &options)
         .map_err(|source| MonteCarloError::Parameters { source })
 }

@@ -32,39 +32,13 @@ pub fn dare_doubling(
     q: &DMatrix<f64>,
     r: &DMatrix<f64>,
 ) -> Result<RiccatiSolution, LinalgError> {
-    let mut flow = Flow::one_step(f, h, q, r)?;
-    let mut change = f64::INFINITY;
-    for iteration in 0..MAX_DOUBLINGS {
-        let step = flow.double()?;
-        change = relative_to_diagonal(&step, flow.x.diagonal().as_slice());
-        // The closed loop must have died out as well: an unstable or undriven mode can sit at zero change.
-        if change <= f64::EPSILON && flow.a.iter().all(|v| v.abs() < 1.0) {
-            let covariance = newton(f, h, q, r, &flow.x)?;
-            let relative_residual = residual(f, h, q, r, &covariance)?;
-            return Ok(RiccatiSolution { covariance, relative_residual, iterations: iteration + 1 });
-        }
-    }
-    Err(LinalgError::NoConvergence { iterations: MAX_DOUBLINGS, residual: change })
+    let (p, iterations) = Flow::one_step(f, h, q, r)?.settled()?;
+    let covariance = newton(f, h, q, r, &p)?;
+    let relative_residual = residual(f, h, q, r, &covariance)?;
+    Ok(RiccatiSolution { covariance, relative_residual, iterations })
 }
 
-/// P(k|k−1) at k = 2^doublings when P(0|−1) is `p0`, from the same doubling; needs no stability. Errors: shapes, R not definite, P0 indefinite.
-pub fn covariance_after(
-    f: &DMatrix<f64>,
-    h: &DMatrix<f64>,
-    q: &DMatrix<f64>,
-    r: &DMatrix<f64>,
-    p0: &DMatrix<f64>,
-    doublings: u32,
-) -> Result<DMatrix<f64>, LinalgError> {
-    require_shape(p0, f.nrows(), f.nrows())?;
-    let mut flow = Flow::one_step(f, h, q, r)?;
-    for _ in 0..doublings {
-        flow.double()?;
-    }
-    flow.apply(p0)
-}
-
-/// The Riccati recursion over 2^k steps, P → X + Aᵀ P (I + G P)⁻¹ A: A is the transposed closed-loop transition from P = 0,
+/// The Riccati recursion over some steps, P → X + Aᵀ P (I + G P)⁻¹ A: A is the transposed closed-loop transition from P = 0,
 /// X the covariance reached from P = 0, G the information gathered about the start.
 #[derive(Clone, Debug)]
 pub struct Flow {
@@ -82,6 +56,96 @@ impl Flow {
         r: &DMatrix<f64>,
     ) -> Result<Flow, LinalgError> {
         Ok(Flow { a: f.transpose(), g: information(f, h, q, r)?, x: q.clone() })
+    }
+
+    /// One step without a measurement. Errors: shapes.
+    pub fn prediction(f: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<Flow, LinalgError> {
+        let n = f.nrows();
+        require_shape(f, n, n)?;
+        require_shape(q, n, n)?;
+        Ok(Flow { a: f.transpose(), g: DMatrix::zeros(n, n), x: q.clone() })
+    }
+
+    /// No step at all.
+    pub fn none(n: usize) -> Flow {
+        Flow { a: DMatrix::identity(n, n), g: DMatrix::zeros(n, n), x: DMatrix::zeros(n, n) }
+    }
+
+    /// These steps, then those of `next`. With W = I + G' X: A W⁻¹ A', G + A W⁻¹ G' Aᵀ, X' + A'ᵀ X W⁻¹ A'.
+    pub fn then(&self, next: &Flow) -> Result<Flow, LinalgError> {
+        let n = self.a.nrows();
+        let w = DMatrix::<f64>::identity(n, n) + &next.g * &self.x;
+        let w_a = solve(w.clone(), &next.a)?;
+        let w_g = solve(w, &next.g)?;
+        let mut x = &next.x + next.a.transpose() * &self.x * &w_a;
+        symmetrise(&mut x);
+        let mut g = &self.g + &self.a * w_g * self.a.transpose();
+        symmetrise(&mut g);
+        Ok(Flow { a: &self.a * w_a, g, x })
+    }
+
+    /// These steps `count` times.
+    pub fn times(&self, count: u64) -> Result<Flow, LinalgError> {
+        let mut result = Flow::none(self.a.nrows());
+        let mut power = self.clone();
+        for bit in 0..u64::BITS - count.leading_zeros() {
+            if bit > 0 {
+                power.double()?;
+            }
+            if count >> bit & 1 == 1 {
+                result = result.then(&power)?;
+            }
+        }
+        Ok(result)
+    }
+
+    /// The covariance that these steps, over and over, lead to from P = 0, and the doublings it took.
+    fn settled(mut self) -> Result<(DMatrix<f64>, usize), LinalgError> {
+        let mut change = f64::INFINITY;
+        for iteration in 0..MAX_DOUBLINGS {
+            let step = self.double()?;
+            change = relative_to_diagonal(&step, self.x.diagonal().as_slice());
+            // The closed loop must have died out as well: an unstable or undriven mode can sit at zero change.
+            if change <= f64::EPSILON && self.a.iter().all(|v| v.abs() < 1.0) {
+                return Ok((self.x, iteration + 1));
+            }
+        }
+        Err(LinalgError::NoConvergence { iterations: MAX_DOUBLINGS, residual: change })
+    }
+
+    /// The covariance P(k|k−1) that repeats after these steps: periodic Riccati equation P = X + Aᵀ P (I + G P)⁻¹ A, by doubling and one
+    /// Newton step. Conditions and errors as of [`dare_doubling`].
+    pub fn periodic(&self) -> Result<RiccatiSolution, LinalgError> {
+        let n = self.a.nrows();
+        let (p, iterations) = self.clone().settled()?;
+        let closed = self.closed_loop(&p)?;
+        let mut driven = &closed * &p * &self.g * &p * closed.transpose() + &self.x;
+        symmetrise(&mut driven);
+        let covariance = stationary(closed - DMatrix::<f64>::identity(n, n), driven)?;
+        let relative_residual = self.residual(&covariance)?;
+        Ok(RiccatiSolution { covariance, relative_residual, iterations })
+    }
+
+    /// Largest entry of X + Aᵀ P (I + G P)⁻¹ A − P, relative to √(P_ii P_jj).
+    fn residual(&self, p: &DMatrix<f64>) -> Result<f64, LinalgError> {
+        let difference = &self.x + self.closed_loop(p)? * p * &self.a - p;
+        Ok(relative_to_diagonal(&difference, p.diagonal().as_slice()))
+    }
+
+    /// How an error at the start lives on over these steps when the filter starts with `p`: Aᵀ (I + P G)⁻¹.
+    pub fn closed_loop(&self, p: &DMatrix<f64>) -> Result<DMatrix<f64>, LinalgError> {
+        let n = self.a.nrows();
+        require_shape(p, n, n)?;
+        let w = DMatrix::<f64>::identity(n, n) + &self.g * p;
+        Ok(solve(w, &self.a)?.transpose())
+    }
+
+    /// The same by eigenvectors, see [`dare_eigenvector`]. States that forget everything within the steps make eigenvalues of zero that
+    /// cannot be told apart: the residual says so.
+    pub fn periodic_eigenvector(&self) -> Result<RiccatiSolution, LinalgError> {
+        let covariance = eigenvector_solution(&self.a.transpose(), &self.g, &self.x)?;
+        let relative_residual = self.residual(&covariance)?;
+        Ok(RiccatiSolution { covariance, relative_residual, iterations: 1 })
     }
 
     /// P(k|k−1) after these steps from P(0|−1) = `p0` = L Lᵀ: X + Aᵀ L (I + Lᵀ G L)⁻¹ Lᵀ A. Errors: P0 indefinite.
@@ -121,8 +185,14 @@ pub fn dare_eigenvector(
     q: &DMatrix<f64>,
     r: &DMatrix<f64>,
 ) -> Result<RiccatiSolution, LinalgError> {
+    let covariance = eigenvector_solution(f, &information(f, h, q, r)?, q)?;
+    let relative_residual = residual(f, h, q, r, &covariance)?;
+    Ok(RiccatiSolution { covariance, relative_residual, iterations: 1 })
+}
+
+/// [`dare_eigenvector`] with G = Hᵀ R⁻¹ H.
+fn eigenvector_solution(f: &DMatrix<f64>, g: &DMatrix<f64>, q: &DMatrix<f64>) -> Result<DMatrix<f64>, LinalgError> {
     let n = f.nrows();
-    let g = information(f, h, q, r)?;
     // P = s P̃ makes the two quadratic blocks equally large: Q/s and s G.
     let scale = if g.amax() > 0.0 && q.amax() > 0.0 { (q.amax() / g.amax()).sqrt() } else { 1.0 };
     let mut left = DMatrix::zeros(2 * n, 2 * n);
@@ -130,7 +200,7 @@ pub fn dare_eigenvector(
     left.view_mut((0, 0), (n, n)).copy_from(&f.transpose());
     left.view_mut((n, 0), (n, n)).copy_from(&(q / -scale));
     left.view_mut((n, n), (n, n)).fill_with_identity();
-    right.view_mut((0, n), (n, n)).copy_from(&(&g * scale));
+    right.view_mut((0, n), (n, n)).copy_from(&(g * scale));
     right.view_mut((n, n), (n, n)).copy_from(f);
 
     let failure = || LinalgError::NoConvergence { iterations: 1, residual: f64::NAN };
@@ -153,8 +223,7 @@ pub fn dare_eigenvector(
         return Err(LinalgError::Singular);
     }
     symmetrise(&mut covariance);
-    let relative_residual = residual(f, h, q, r, &covariance)?;
-    Ok(RiccatiSolution { covariance, relative_residual, iterations: 1 })
+    Ok(covariance)
 }
 
 /// Discrete Lyapunov equation X = A X Aᵀ + Q by doubling (A stable, Q symmetric semidefinite): a sum of semidefinite terms.

@@ -7,7 +7,7 @@ use serde::{Serialize, Serializer};
 
 use super::measured::Range;
 use super::place::{KeyError, Object, Place};
-use super::{AxisParams, Measured, NotIdentified, Params, Source, TermEntry};
+use super::{AxisParams, Design, Measured, NotIdentified, Params, Source, TermEntry};
 use crate::units::{Dimension, Quantity, Unit};
 
 pub(super) const FORMAT: &str = "kfdesign-params/1";
@@ -43,6 +43,9 @@ pub(super) struct ParamsDocument {
     sample_rate: Measured,
     #[schemars(length(min = 1))]
     axes: Vec<AxisDocument>,
+    /// The plant that the sensor is part of, and its aids; at rest when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    design: Option<Design>,
     #[serde(skip_serializing_if = "Option::is_none")]
     source: Option<SourceDocument>,
 }
@@ -276,6 +279,7 @@ impl Serialize for Params {
             quantity: self.quantity,
             sample_rate: hertz,
             axes: self.axes.iter().map(AxisDocument::from).collect(),
+            design: self.design.clone(),
             source: self.source.as_ref().map(SourceDocument::from),
         }
         .serialize(serializer)
@@ -284,7 +288,8 @@ impl Serialize for Params {
 
 /// The whole document.
 pub(super) fn params(root: &Place<'_>) -> Result<Params, KeyError> {
-    let object = root.document(FORMAT, "a parameter file", &["format", "quantity", "sample_rate", "axes", "source"])?;
+    let object =
+        root.document(FORMAT, "a parameter file", &["format", "quantity", "sample_rate", "axes", "design", "source"])?;
     let quantity = quantity(&object.required("quantity")?)?;
     let sample_rate = object.required("sample_rate")?;
     let sample_rate_hz = Measured::from_place(&sample_rate, Dimension::FREQUENCY, Range::Positive)?.si();
@@ -300,7 +305,8 @@ pub(super) fn params(root: &Place<'_>) -> Result<Params, KeyError> {
         }
     }
     let source = object.optional("source").map(|p| source(&p)).transpose()?;
-    Ok(Params { quantity, sample_rate_hz, axes, source })
+    let design = object.optional("design").map(|p| Design::from_place(&p)).transpose()?;
+    Ok(Params { quantity, sample_rate_hz, axes, design, source })
 }
 
 pub(crate) fn quantity(place: &Place<'_>) -> Result<Quantity, KeyError> {

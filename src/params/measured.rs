@@ -40,6 +40,13 @@ impl Measured {
         Measured { value: unit.from_si(value), interval: interval.map(|i| i.map(|v| unit.from_si(v))), unit }
     }
 
+    /// A positive value from a text such as `0.0562 deg/s/sqrt(Hz)`, with its dimension checked; an error says what is wrong.
+    pub fn positive(text: &str, expected: Dimension) -> Result<Measured, String> {
+        let measured = short_form(text)?;
+        measured.unit.require(expected).map_err(|e| e.to_string())?;
+        if measured.value > 0.0 { Ok(measured) } else { Err(format!("{text} must be greater than zero")) }
+    }
+
     /// Reads either form and checks dimension and range.
     pub(crate) fn from_place(place: &Place<'_>, expected: Dimension, range: Range) -> Result<Measured, KeyError> {
         let example = expected.example();

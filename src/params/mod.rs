@@ -2,8 +2,9 @@
 
 //!
 //! `place` reads JSON key by key with the place of every complaint, `measured` is a value with its unit, `document` the
-//! layout of the file and its schema.
+//! layout of the file and its schema, `design` its section on the plant.
 
+mod design;
 mod document;
 mod measured;
 pub mod place;
@@ -13,6 +14,10 @@ use std::path::Path;
 use crate::noise::{NoiseModel, Term};
 use crate::units::{Quantity, Unit, UnitError};
 
+pub use design::{
+    AidDrift, AidEntry, CustomEntry, Design, MotionEntry, NamedEntry, PLANTS, PlantEntry, StateEntry, check_name,
+    unknown_plant,
+};
 pub(crate) use document::quantity;
 pub use measured::Measured;
 pub(crate) use measured::Range;
@@ -71,6 +76,8 @@ pub struct Params {
     /// Hz.
     pub sample_rate_hz: f64,
     pub axes: Vec<AxisParams>,
+    /// The plant that the sensor is part of; at rest when absent.
+    pub design: Option<Design>,
     pub source: Option<Source>,
 }
 

@@ -12,6 +12,9 @@ pub const RATE_TOLERANCE: f64 = 0.005;
 /// their last letter x, y, z (`gyro_x`, `wx`, `x`); else, when both have the same number of axes and no name tells otherwise, by order.
 /// Log axes that the design does not have are left out.
 pub fn assign(design: &FilterDesign, log: &LogShape) -> Result<Vec<usize>, ReplayError> {
+    if design.plant != "static" {
+        return Err(ReplayError::Plant { plant: design.plant.clone() });
+    }
     if log.quantity != design.quantity {
         return Err(ReplayError::Quantity { log: log.quantity.si_unit(), filter: design.quantity.si_unit() });
     }

@@ -84,6 +84,10 @@ pub enum ReplayError {
         "axis '{axis}' of the filter has {count} measurements; replay handles filters with one measurement per axis"
     )]
     Measurements { axis: String, count: usize },
+    #[error(
+        "the filter is for the plant '{plant}'; replay handles sensors at rest (plant static), montecarlo judges this filter on simulated runs"
+    )]
+    Plant { plant: String },
     #[error("{name} is {value}, expected {expected}")]
     Option { name: &'static str, value: f64, expected: &'static str },
 }

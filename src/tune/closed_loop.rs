@@ -6,10 +6,11 @@ use nalgebra::{Complex, DMatrix};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::filter::steady_state::SteadyState;
+use crate::filter::Kalman;
+use crate::filter::steady_state::{SteadyState, SteadyStateError, steady_state};
 use crate::model::LinearModel;
 use crate::model::observability::undriven_states;
-use crate::numerics::linalg::LinalgError;
+use crate::numerics::linalg::{LinalgError, symmetrise};
 use crate::numerics::riccati::lyapunov;
 
 /// One cause of the final variance.
@@ -23,12 +24,11 @@ pub struct Share {
     pub share: f64,
 }
 
-/// The states that stay uncertain: those of driven processes. The others are learnt for good. None if no drift is among them.
-fn driven(model: &LinearModel) -> Vec<usize> {
+/// The states that stay uncertain: those of driven processes. The others are learnt for good. None if `row` sees none of them.
+fn driven(model: &LinearModel, row: &DMatrix<f64>) -> Vec<usize> {
     let undriven = undriven_states(model);
     let driven: Vec<usize> = (0..model.states.len()).filter(|i| !undriven.contains(i)).collect();
-    let drift = model.drift_row();
-    if driven.iter().any(|&i| drift[(0, i)] != 0.0) { driven } else { Vec::new() }
+    if driven.iter().any(|&i| row[(0, i)] != 0.0) { driven } else { Vec::new() }
 }
 
 /// The part of a matrix with these rows and columns.
@@ -36,47 +36,112 @@ fn part(a: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
     DMatrix::from_fn(rows.len(), columns.len(), |i, j| a[(rows[i], columns[j])])
 }
 
-/// The noise term that drives a state.
+/// The noise term that drives a state; of an aid with its name before it.
 fn source(state: &str) -> String {
-    match state.split_once('.') {
-        _ if state == "bias" => "rate_random_walk".into(),
-        Some((chain @ ("bias_instability" | "moving_average" | "quantization" | "rate_ramp"), _)) => chain.into(),
-        _ => state.replace(".quadrature", ""),
+    let kinds = ["bias_instability", "moving_average", "quantization", "rate_ramp"];
+    if state == "bias" || state.ends_with(".bias") {
+        return state.replace("bias", "rate_random_walk");
+    }
+    let sensor = |at: usize| state[..at].is_empty() || state[..at].ends_with('.');
+    match kinds.iter().find_map(|kind| Some((state.find(kind).filter(|at| sensor(*at))?, kind))) {
+        Some((at, kind)) => format!("{}{kind}", &state[..at]),
+        None => state.replace(".quadrature", ""),
     }
 }
 
-/// How much of the final variance d P(k|k) dᵀ of the drift estimate each noise source causes.
+/// Process noise of each source, adding up to Q: the given ones, then what is left by the states it stands at.
+fn process_sources(model: &LinearModel, noise: &[(String, DMatrix<f64>)]) -> Vec<(String, DMatrix<f64>)> {
+    let mut rest = model.q.clone();
+    for (_, q) in noise {
+        rest -= q;
+    }
+    let n = model.states.len();
+    let of_state: Vec<String> = model.states.iter().map(|state| source(&state.name)).collect();
+    let mut sources = noise.to_vec();
+    for name in &of_state {
+        if sources.iter().any(|(known, _)| known == name) {
+            continue;
+        }
+        let own = |i: usize, j: usize| of_state[i] == *name && of_state[j] == *name;
+        // what subtraction leaves of a given one is rounding
+        let left = |i: usize, j: usize| rest[(i, j)].abs() > f64::EPSILON * model.q[(i, j)].abs();
+        let q = DMatrix::from_fn(n, n, |i, j| if own(i, j) && left(i, j) { rest[(i, j)] } else { 0.0 });
+        if q.iter().any(|v| *v != 0.0) {
+            sources.push((name.clone(), q));
+        }
+    }
+    sources
+}
+
+/// How much of the final variance d P(k|k) dᵀ of an estimate d x each noise source causes, at a sample at which all measurements are taken.
 ///
 /// In steady state the error obeys e ← (I − K H) F e + (I − K H) v − K w. It is linear, so each source has its own
-/// covariance X = A X Aᵀ + (I − K H) Q_i (I − K H)ᵀ or A X Aᵀ + K R Kᵀ, and they add up to P(k|k).
+/// covariance X = A X Aᵀ + (I − K H) Q_i (I − K H)ᵀ or A X Aᵀ + K R_i Kᵀ, and they add up to P(k|k). With measurements at several rates
+/// A and the noise are those of one period. `noise`: process noise with names of its own ([`Augmented`](crate::model::Augmented)), the
+/// rest of Q is named by its states. The first measurement's noise is "white", that of others has their name ("heading.white").
 /// A constant bias causes nothing in the long run. Errors: the loop does not settle.
-pub fn error_budget(model: &LinearModel, steady: &SteadyState) -> Result<Vec<Share>, LinalgError> {
-    let kept = driven(model);
+pub fn error_budget(
+    model: &LinearModel,
+    steady: &SteadyState,
+    row: &DMatrix<f64>,
+    noise: &[(String, DMatrix<f64>)],
+) -> Result<Vec<Share>, LinalgError> {
+    let kept = driven(model, row);
     if kept.is_empty() {
         return Ok(Vec::new());
     }
     let all: Vec<usize> = (0..model.h.nrows()).collect();
-    let (f, q) = (part(&model.f, &kept, &kept), part(&model.q, &kept, &kept));
+    let d = part(row, &[0], &kept);
+    let f = part(&model.f, &kept, &kept);
     let h = part(&model.h, &all, &kept);
-    let d = part(&model.drift_row(), &[0], &kept);
-    let k = part(&steady.gain, &kept, &all);
-    let keep = DMatrix::identity(kept.len(), kept.len()) - &k * &h;
-    let a = &keep * &f;
-    let variance = |noise: DMatrix<f64>| -> Result<f64, LinalgError> {
-        let x = lyapunov(&a, &noise)?;
-        Ok((&d * x * d.transpose())[(0, 0)])
-    };
-    let mut shares =
-        vec![Share { source: "white".into(), variance_si: variance(&k * &model.r * k.transpose())?, share: 0.0 }];
-    let mut sources: Vec<String> = kept.iter().map(|&i| source(&model.states[i].name)).collect();
-    let of_state = sources.clone();
-    sources.dedup();
-    for name in sources {
-        let q_i = DMatrix::from_fn(kept.len(), kept.len(), |i, j| {
-            if of_state[i] == name && of_state[j] == name { q[(i, j)] } else { 0.0 }
-        });
-        let variance_si = variance(&keep * q_i * keep.transpose())?;
-        shares.push(Share { source: name, variance_si, share: 0.0 });
+    let white = |i: usize| if model.inputs.is_empty() && i == 0 { "white".into() } else { white_name(model, i) };
+    let mut names: Vec<String> = all.iter().map(|&i| white(i)).collect();
+    let mut sums = vec![DMatrix::zeros(kept.len(), kept.len()); names.len()];
+    let mut process = Vec::new();
+    for (name, q) in process_sources(model, noise) {
+        let q = part(&q, &kept, &kept);
+        if q.iter().any(|v| *v != 0.0) {
+            names.push(name);
+            sums.push(DMatrix::zeros(kept.len(), kept.len()));
+            process.push(q);
+        }
+    }
+    // one period, from after the measurements of one sample at which all are taken to after those of the next
+    let mut kalman = Kalman::new(&settled(model, &kept)?);
+    let every: Vec<u64> = model.every.iter().map(|&e| e as u64).collect();
+    let mut closed = DMatrix::<f64>::identity(kept.len(), kept.len());
+    for i in all.iter().copied() {
+        kalman.update(i, 0.0, None);
+    }
+    for step in 1..=steady.period {
+        kalman.predict();
+        closed = &f * closed;
+        for (i, sum) in sums.iter_mut().enumerate() {
+            *sum = &f * &*sum * f.transpose();
+            if let Some(q) = i.checked_sub(all.len()).map(|i| &process[i]) {
+                *sum += q;
+            }
+        }
+        for i in all.iter().copied().filter(|&i| step.is_multiple_of(every[i])) {
+            kalman.update(i, 0.0, None);
+            let h = h.row(i);
+            // K = P(k|k) hᵀ / r, the same as P(k|k−1) hᵀ / S
+            let k = &kalman.p * h.transpose() / model.r[(i, i)];
+            let keep = DMatrix::identity(kept.len(), kept.len()) - &k * h;
+            closed = &keep * closed;
+            for (source, sum) in sums.iter_mut().enumerate() {
+                *sum = &keep * &*sum * keep.transpose();
+                if source == i {
+                    *sum += &k * model.r[(i, i)] * k.transpose();
+                }
+            }
+        }
+    }
+    let mut shares = Vec::with_capacity(names.len());
+    for (source, noise) in names.into_iter().zip(&mut sums) {
+        symmetrise(noise);
+        let x = lyapunov(&closed, noise)?;
+        shares.push(Share { source, variance_si: (&d * x * d.transpose())[(0, 0)], share: 0.0 });
     }
     let total: f64 = shares.iter().map(|s| s.variance_si).sum();
     for share in &mut shares {
@@ -85,19 +150,46 @@ pub fn error_budget(model: &LinearModel, steady: &SteadyState) -> Result<Vec<Sha
     Ok(shares)
 }
 
-/// Frequency in Hz at which the estimate of the whole drift follows the measurement with half the power it has at zero frequency.
+fn white_name(model: &LinearModel, measurement: usize) -> String {
+    format!("{}.white", model.measurements[measurement].name)
+}
+
+/// The states `kept` alone, settled, before the measurements of a sample at which all are taken.
+fn settled(model: &LinearModel, kept: &[usize]) -> Result<LinearModel, LinalgError> {
+    let mut alone = LinearModel {
+        states: kept.iter().map(|&i| model.states[i].clone()).collect(),
+        outputs: Vec::new(),
+        f: part(&model.f, kept, kept),
+        g: model.g.select_rows(kept),
+        h: model.h.select_columns(kept),
+        q: part(&model.q, kept, kept),
+        x0: model.x0.select_rows(kept),
+        p0: part(&model.p0, kept, kept),
+        ..model.clone()
+    };
+    let steady = steady_state(&alone).map_err(|error| match error {
+        SteadyStateError::Linalg(source) | SteadyStateError::Riccati { source, .. } => source,
+        _ => LinalgError::Singular,
+    })?;
+    alone.p0 = steady.predicted_covariance;
+    Ok(alone)
+}
+
+/// Frequency in Hz at which the estimate of the whole drift follows the measurement with half the power it has at zero frequency; of a
+/// sensor at rest.
 ///
 /// T(ω) = d [I − (I − K H) F e^(−jω dt)]⁻¹ K. For one pole λ near one it is (1 − λ)/(2π dt). `None` when the steady gain is zero or
 /// the estimate follows up to half the sample rate.
 pub fn bandwidth_hz(model: &LinearModel, steady: &SteadyState) -> Option<f64> {
-    let kept = driven(model);
-    let all: Vec<usize> = (0..model.h.nrows()).collect();
-    let h = part(&model.h, &all, &kept);
-    let d = part(&model.drift_row(), &[0], &kept);
-    let k = part(&steady.gain, &kept, &all);
-    if kept.is_empty() {
+    let drift = model.drift_row();
+    let kept = driven(model, &drift);
+    if kept.is_empty() || !model.outputs.is_empty() {
         return None;
     }
+    let all: Vec<usize> = (0..model.h.nrows()).collect();
+    let h = part(&model.h, &all, &kept);
+    let d = part(&drift, &[0], &kept);
+    let k = part(&steady.gain, &kept, &all);
     let a = (DMatrix::identity(kept.len(), kept.len()) - &k * &h) * part(&model.f, &kept, &kept);
     let power = |f_hz: f64| -> Option<f64> {
         let turn = Complex::from_polar(1.0, -TAU * f_hz * model.dt);

@@ -111,5 +111,6 @@ fn without(model: LinearModel, gone: &[usize], variance: f64) -> LinearModel {
         inputs: model.inputs,
         measurements: model.measurements,
         every: model.every,
+        outputs: model.outputs,
     }
 }

@@ -1,25 +1,28 @@
 //! Noise parameters to a filter design: augmentation, steady state, predicted sigma(t), error budget (floor 4).
 //!
-//! `sensor` turns the parameters of an axis into a linear model (merging what no filter can tell apart), `prediction` propagates its
+//! `sensor` turns the parameters of an axis into a linear model (merging what no filter can tell apart), `plant` joins it with the
+//! documented plant and its aids, `prediction` propagates its
 //! covariance over any time, `closed_loop` splits the final variance into its causes and finds the bandwidth,
 //! `under_truth` says what the design does when the sensor is another.
 
 mod closed_loop;
 mod flicker;
+mod plant;
 mod prediction;
 mod sensor;
 mod under_truth;
 
+use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::json;
 
 use crate::filter::steady_state::{SteadyStateError, steady_state};
 use crate::filter::{AxisDesign, FilterDesign};
-use crate::model::{LinearModel, ModelError, Plant};
+use crate::model::{DRIFT, LinearModel, ModelError};
 use crate::noise::TooFast;
 use crate::numerics::linalg::LinalgError;
-use crate::params::{AxisParams, Params};
+use crate::params::{AxisParams, Design, Params};
 use crate::units::Quantity;
 
 pub use closed_loop::{Share, bandwidth_hz, error_budget};
@@ -28,16 +31,17 @@ pub use prediction::{Predicted, predicted_sigma};
 pub use under_truth::{ErrorOverTime, Tendency, UnderTruth, under_truth};
 
 /// Choices of [`tune`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct TuneOptions {
-    pub plant: Plant,
+    /// Instead of the design of the parameters.
+    pub design: Option<Design>,
     /// Slowest time constant, s, that the approximation of flicker covers.
     pub flicker_horizon_s: f64,
 }
 
 impl Default for TuneOptions {
     fn default() -> TuneOptions {
-        TuneOptions { plant: Plant::Static, flicker_horizon_s: 10_000.0 }
+        TuneOptions { design: None, flicker_horizon_s: 10_000.0 }
     }
 }
 
@@ -56,6 +60,8 @@ pub enum TuneError {
     SteadyState { axis: String, source: SteadyStateError },
     #[error("axis '{axis}': {source}")]
     Linalg { axis: String, source: LinalgError },
+    #[error("axis '{axis}': nothing measures the {output}; give an aid, for example --aid \"2 deg @ 1 Hz\"")]
+    NoAid { axis: String, output: String },
     #[error("the truth has the axes {truth}, the design {design}; expected the same names")]
     TruthAxes { truth: String, design: String },
     #[error("the truth is in {truth}, the design in {design}")]
@@ -78,10 +84,22 @@ pub struct AxisReport {
     pub bandwidth_hz: Option<f64>,
     /// Causes of the final variance of the drift estimate; the shares sum to one. Empty when that variance tends to zero.
     pub error_budget: Vec<Share>,
+    /// The same of every state of the plant; empty for a sensor at rest.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub plant_budgets: Vec<PlantBudget>,
     /// Present when flicker is approximated.
     pub flicker: Option<FlickerApproximation>,
     /// What was decided where the parameters left a choice.
     pub warnings: Vec<String>,
+}
+
+/// Causes of the final variance of the estimate of a state of the plant.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct PlantBudget {
+    pub state: String,
+    /// SI.
+    pub unit: String,
+    pub error_budget: Vec<Share>,
 }
 
 /// A design with what it promises.
@@ -97,12 +115,15 @@ pub struct Tuned {
 /// of a process its stationary variance. A rate random walk has the same dynamics as the constant bias and shares its state;
 /// flicker is a chain of Gauss-Markov states. Lines, moving averages and quantisation are noise of the measurement: they have states, but are no
 /// part of the drift.
-/// Errors: no white noise, a line not below half the sample rate, or a model without a steady state.
+///
+/// The plant is that of `options`, else that of the parameters, else the sensor rests.
+/// Errors: no white noise, a line not below half the sample rate, a plant that does not fit, or a model without a steady state.
 pub fn tune(params: &Params, options: &TuneOptions) -> Result<Tuned, TuneError> {
+    let chosen = options.design.clone().or_else(|| params.design.clone()).unwrap_or_default();
     let mut axes = Vec::with_capacity(params.axes.len());
     let mut reports = Vec::with_capacity(params.axes.len());
     for axis in &params.axes {
-        let (design, report) = tune_axis(axis, params.quantity, params.sample_rate_hz, options)?;
+        let (design, report) = tune_axis(axis, params.quantity, params.sample_rate_hz, &chosen, options)?;
         axes.push(design);
         reports.push(report);
     }
@@ -110,7 +131,8 @@ pub fn tune(params: &Params, options: &TuneOptions) -> Result<Tuned, TuneError> 
     let design = FilterDesign {
         quantity: params.quantity,
         sample_rate_hz: params.sample_rate_hz,
-        plant: options.plant.name().to_string(),
+        plant: chosen.plant.name().to_string(),
+        design: Some(chosen).filter(|chosen| *chosen != Design::default()),
         axes,
         tuning: json!({
             "method": "exact discretisation of the documented noise terms; nothing is fitted",
@@ -121,26 +143,29 @@ pub fn tune(params: &Params, options: &TuneOptions) -> Result<Tuned, TuneError> 
     Ok(Tuned { design, reports })
 }
 
-/// The linear model that [`tune`] builds a filter on, with which a sensor of these parameters can also be simulated; `dt` in s.
+/// The linear model that [`tune`] builds a filter on, with which such a sensor in its plant can also be simulated; `dt` in s. The plant is
+/// that of `options`; without one the sensor rests.
 ///
-/// Errors: no white noise, `dt` or the flicker horizon out of range.
+/// Errors: no white noise, `dt` or the flicker horizon out of range, a plant that does not fit.
 pub fn sensor_model(
     axis: &AxisParams,
     quantity: Quantity,
     dt: f64,
     options: &TuneOptions,
 ) -> Result<LinearModel, TuneError> {
-    Ok(sensor::build(axis, quantity, dt, options)?.model)
+    let design = options.design.clone().unwrap_or_default();
+    Ok(plant::build(axis, quantity, dt, &design, options)?.model)
 }
 
 fn tune_axis(
     axis: &AxisParams,
     quantity: Quantity,
     sample_rate_hz: f64,
+    chosen: &Design,
     options: &TuneOptions,
 ) -> Result<(AxisDesign, AxisReport), TuneError> {
     let dt = 1.0 / sample_rate_hz;
-    let mut sensor = sensor::build(axis, quantity, dt, options)?;
+    let mut sensor = plant::build(axis, quantity, dt, chosen, options)?;
     if !axis.noise().terms.iter().any(|term| term.kind().is_drift()) {
         sensor.warnings.push(
             "the parameters have no drift process: the filter averages for ever and its gain tends to zero; a real sensor drifts"
@@ -149,9 +174,18 @@ fn tune_axis(
     }
     let steady =
         steady_state(&sensor.model).map_err(|source| TuneError::SteadyState { axis: axis.name.clone(), source })?;
-    let failed = |source| TuneError::Linalg { axis: axis.name.clone(), source };
-    let error_budget = error_budget(&sensor.model, &steady).map_err(failed)?;
-    let final_sigma = error_budget.iter().map(|s| s.variance_si).sum::<f64>().sqrt();
+    let failed = |source: LinalgError| TuneError::Linalg { axis: axis.name.clone(), source };
+    let budget_of = |row: &DMatrix<f64>| error_budget(&sensor.model, &steady, row, &sensor.noise).map_err(failed);
+    let drift_budget = budget_of(&sensor.model.drift_row())?;
+    let mut plant_budgets = Vec::new();
+    for output in sensor.model.outputs.iter().filter(|output| output.name != DRIFT) {
+        plant_budgets.push(PlantBudget {
+            state: output.name.clone(),
+            unit: output.unit.clone(),
+            error_budget: budget_of(&DMatrix::from_row_slice(1, output.row.len(), &output.row))?,
+        });
+    }
+    let final_sigma = drift_budget.iter().map(|s| s.variance_si).sum::<f64>().sqrt();
     let predicted = predicted_sigma(&sensor.model, steady.settling_time).map_err(failed)?;
     let drift_settling_time_s =
         prediction::drift_settling_time(&sensor.model, &predicted, final_sigma).map_err(failed)?;
@@ -162,7 +196,8 @@ fn tune_axis(
         settling_time_s: steady.settling_time,
         drift_settling_time_s,
         bandwidth_hz: bandwidth_hz(&sensor.model, &steady),
-        error_budget,
+        error_budget: drift_budget,
+        plant_budgets,
         flicker: sensor.flicker,
         warnings: sensor.warnings,
     };

@@ -5,9 +5,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::sensor::drift_sigma;
+use crate::filter::Cycle;
 use crate::model::LinearModel;
 use crate::numerics::linalg::{LinalgError, solve_spd, symmetrise};
-use crate::numerics::riccati::Flow;
 
 /// Points per decade of time.
 const PER_DECADE: i32 = 8;
@@ -43,54 +43,76 @@ pub(super) fn drift_settling_time(
     };
     let Some(inside) = predicted.time_s.get(last + 1) else { return Ok(None) };
     let steps = |time: f64| (time / model.dt).round() as u64;
-    let (mut low, mut high) = (steps(predicted.time_s[last]), steps(*inside));
+    // between two samples at which all measurements are taken the sigma is another
+    let period = cycle(model)?.period;
+    let unit = if steps(*inside) > period { period } else { 1 };
+    let (mut low, mut high) = (steps(predicted.time_s[last]) / unit, steps(*inside).div_ceil(unit));
     while high - low > 1 {
         let middle = low + (high - low) / 2;
-        let p = covariances(model, &[middle])?;
+        let p = covariances(model, &[middle * unit])?;
         if p.iter().any(|p| outside(drift_sigma(model, p))) { low = middle } else { high = middle }
     }
-    Ok(Some(high as f64 * model.dt))
+    Ok(Some((high * unit) as f64 * model.dt))
+}
+
+/// The pattern of the measurements; there is one where there is a steady state.
+fn cycle(model: &LinearModel) -> Result<Cycle, LinalgError> {
+    Cycle::new(&model.every).ok_or(LinalgError::NoConvergence { iterations: 0, residual: f64::NAN })
 }
 
 /// P(k|k) at these numbers of steps after the first measurement.
 pub(super) fn covariances(model: &LinearModel, steps: &[u64]) -> Result<Vec<DMatrix<f64>>, LinalgError> {
-    let mut powers = vec![Flow::one_step(&model.f, &model.h, &model.q, &model.r)?];
+    let cycle = cycle(model)?;
+    let mut powers = vec![cycle.flow_of(model, cycle.period)?];
     let mut result = Vec::with_capacity(steps.len());
     for &count in steps {
+        let (whole, rest) = (count / cycle.period, count % cycle.period);
         let mut p = model.p0.clone();
-        for bit in 0..u64::BITS - count.leading_zeros() {
+        for bit in 0..u64::BITS - whole.leading_zeros() {
             while powers.len() <= bit as usize {
                 let mut next = powers[powers.len() - 1].clone();
                 next.double()?;
                 powers.push(next);
             }
-            if count >> bit & 1 == 1 {
+            if whole >> bit & 1 == 1 {
                 p = powers[bit as usize].apply(&p)?;
             }
         }
-        result.push(updated(model, &p)?);
+        if rest > 0 {
+            p = cycle.flow_of(model, rest)?.apply(&p)?;
+        }
+        result.push(updated(model, &cycle.taken(rest), p)?);
     }
     Ok(result)
 }
 
-/// P(k|k) from P(k|k−1), Joseph form.
-fn updated(model: &LinearModel, p: &DMatrix<f64>) -> Result<DMatrix<f64>, LinalgError> {
-    let h = &model.h;
-    let s = h * p * h.transpose() + &model.r;
-    let gain = solve_spd(&s, &(h * p))?.transpose();
+/// P(k|k) from P(k|k−1) with these measurements, Joseph form.
+fn updated(model: &LinearModel, taken: &[usize], p: DMatrix<f64>) -> Result<DMatrix<f64>, LinalgError> {
+    if taken.is_empty() {
+        return Ok(p);
+    }
+    let h = &model.h.select_rows(taken);
+    let r = &model.r.select_rows(taken).select_columns(taken);
+    let s = h * &p * h.transpose() + r;
+    let gain = solve_spd(&s, &(h * &p))?.transpose();
     let keep = DMatrix::identity(p.nrows(), p.nrows()) - &gain * h;
-    let mut next = &keep * p * keep.transpose() + &gain * &model.r * gain.transpose();
+    let mut next = &keep * p * keep.transpose() + &gain * r * gain.transpose();
     symmetrise(&mut next);
     Ok(next)
 }
 
 /// Predicted standard deviations at log-spaced times: the first measurement, then eight per decade to ten settling times or more.
+/// With measurements at several rates, times beyond the period are those at which all are taken.
 pub fn predicted_sigma(model: &LinearModel, settling_time_s: f64) -> Result<Predicted, LinalgError> {
     let span = (10.0 * settling_time_s).max(SHORTEST_SPAN).max(100.0 * model.dt);
     let most = (span / model.dt).min(MOST_STEPS);
+    let period = cycle(model)?.period as f64;
     let mut steps = vec![0u64];
     for k in 0.. {
-        let count = 10f64.powf(f64::from(k) / f64::from(PER_DECADE)).round();
+        let mut count = 10f64.powf(f64::from(k) / f64::from(PER_DECADE)).round();
+        if count > period {
+            count = (count / period).round() * period;
+        }
         if count > most * 1.001 {
             break;
         }

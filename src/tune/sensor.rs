@@ -2,10 +2,10 @@
 
 use nalgebra::DMatrix;
 
+use super::TuneError;
 use super::flicker::{self, FlickerApproximation};
-use super::{TuneError, TuneOptions};
 use crate::model::observability::observability;
-use crate::model::{InitialBias, LinearModel, ModelError, augment};
+use crate::model::{InitialBias, LinearModel, ModelError, sensor_errors};
 use crate::noise::{Kind, NoiseModel, Term};
 use crate::numerics::linalg::LinalgError;
 use crate::params::AxisParams;
@@ -23,12 +23,7 @@ pub(super) struct Sensor {
 }
 
 /// States "bias" and those of each drift process; see [`super::tune`].
-pub(super) fn build(
-    axis: &AxisParams,
-    quantity: Quantity,
-    dt: f64,
-    options: &TuneOptions,
-) -> Result<Sensor, TuneError> {
+pub(super) fn build(axis: &AxisParams, quantity: Quantity, dt: f64, horizon_s: f64) -> Result<Sensor, TuneError> {
     let failed = |source| match source {
         ModelError::NoMeasurementNoise => TuneError::NoMeasurementNoise { axis: axis.name.clone() },
         ModelError::TooFast(line) => TuneError::TooFast { axis: axis.name.clone(), line },
@@ -37,8 +32,7 @@ pub(super) fn build(
     let mut warnings = Vec::new();
     let noise = merged(&axis.noise(), &mut warnings);
     let mut bias = InitialBias { mean: axis.bias.as_ref().map_or(0.0, |b| b.si()), std_dev: 0.0 };
-    let horizon_s = options.flicker_horizon_s;
-    let model = augment(options.plant, quantity, &noise, Some(bias), dt, horizon_s).map_err(failed)?;
+    let model = sensor_errors(quantity, &noise, Some(bias), dt, horizon_s).map_err(failed)?;
     let (mut model, flicker) = flicker::simplify(model, &noise, horizon_s);
     bias.std_dev = match &axis.turn_on_bias {
         Some(given) => given.si(),
@@ -201,6 +195,7 @@ fn share_level(model: LinearModel, warnings: &mut Vec<String>) -> LinearModel {
         inputs: model.inputs,
         measurements: model.measurements,
         every: model.every,
+        outputs: model.outputs,
         r: model.r,
     }
 }

@@ -4,13 +4,13 @@ use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::sensor;
+use super::plant;
 use super::{TuneError, TuneOptions, Tuned};
 use crate::filter::AxisDesign;
 use crate::filter::gains::GainSequence;
 use crate::filter::judge::Judge;
-use crate::filter::mismatch::{Expectation, ExpectedError, expect};
-use crate::model::{LinearModel, Named};
+use crate::filter::mismatch::{Expectation, ExpectedError, ExpectedInnovations, expect};
+use crate::model::{DRIFT, LinearModel, Named};
 use crate::params::Params;
 use crate::units::digits;
 
@@ -95,7 +95,8 @@ pub fn under_truth(tuned: &Tuned, truth: &Params, options: &TuneOptions) -> Resu
     let mut results = Vec::with_capacity(design.axes.len());
     for axis in &design.axes {
         let its_truth = truth.axes.iter().find(|t| t.name == axis.name).ok_or_else(other_axes)?;
-        let sensor = sensor::build(its_truth, truth.quantity, axis.model.dt, options)?;
+        let chosen = design.design.clone().unwrap_or_default();
+        let sensor = plant::build(its_truth, truth.quantity, axis.model.dt, &chosen, options)?;
         let alike = worked_out.iter().find(|(filter, truth, _)| **filter == axis.model && *truth == sensor.model);
         let mut result = match alike {
             Some((_, _, result)) => result.clone(),
@@ -126,7 +127,7 @@ fn one_axis(axis: &AxisDesign, truth: &LinearModel) -> UnderTruth {
     let same_states = filter.states == truth.states && filter.h == truth.h;
     let judge = judge(filter, truth, same_states);
     let gains = GainSequence::new(filter, last + 1, &steps);
-    let Expectation { epochs, innovations } = expect(filter, truth, &gains, &judge, &[vec![]]);
+    let Expectation { epochs, innovations } = expect(filter, truth, &gains, &judge, &vec![vec![]; filter.every.len()]);
     let of = |i: usize| ErrorOverTime {
         name: judge.components[i].name.clone(),
         mean: epochs.iter().map(|e| e.mean[i]).collect(),
@@ -140,13 +141,20 @@ fn one_axis(axis: &AxisDesign, truth: &LinearModel) -> UnderTruth {
         drift: of(states),
         states: (0..states).map(of).collect(),
         nees: epochs.iter().map(|e| nees(e, states)).collect(),
-        nis: innovations[0].nis,
+        nis: mean_nis(&innovations, &gains),
         tendency: Tendency::AsClaimed,
         meaning: String::new(),
         notes,
     };
     (result.tendency, result.meaning) = conclusion(&result);
     result
+}
+
+/// Over the updates of all measurements.
+fn mean_nis(innovations: &[ExpectedInnovations], gains: &GainSequence) -> f64 {
+    let updates: Vec<f64> = gains.every.iter().map(|every| gains.steps.div_ceil(*every) as f64).collect();
+    let sum: f64 = innovations.iter().zip(&updates).map(|(i, updates)| i.nis * updates).sum();
+    sum / updates.iter().sum::<f64>()
 }
 
 /// The first measurement and [`TIMES`] steps from 1 to `last`, evenly spaced in their logarithm.
@@ -166,8 +174,13 @@ fn judge(filter: &LinearModel, truth: &LinearModel, same_states: bool) -> Judge 
         DMatrix::from_fn(states + 1, model.states.len(), row)
     };
     let mut components = filter.states[..states].to_vec();
-    components.push(Named { name: "whole drift".into(), unit: filter.measurements[0].unit.clone() });
+    components.push(Named { name: "whole drift".into(), unit: drift_unit(filter) });
     Judge { components, of_truth: stack(truth), of_estimate: stack(filter) }
+}
+
+fn drift_unit(model: &LinearModel) -> String {
+    let drift = model.outputs.iter().find(|output| output.name == DRIFT).map(|output| &output.unit);
+    drift.unwrap_or(&model.measurements[0].unit).clone()
 }
 
 /// E[NEES] per component: of all states, or of the whole drift where they are not judged.

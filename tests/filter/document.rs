@@ -39,6 +39,7 @@ fn design() -> FilterDesign {
         quantity: Quantity::AngularRate,
         sample_rate_hz: 100.0,
         plant: "static".into(),
+        design: None,
         axes: vec![axis("x", two), axis("y", drift(0.1 / 3.0, 100.0 / 7.0, 0.05, 0.01)), axis("z", dense)],
         tuning: json!({ "method": "exact", "moved": [1, 2.5, "R"] }),
     }

@@ -1,7 +1,7 @@
 //! The exact likelihood against the density of the normal vector it stands for.
 
 use kfdesign::filter::likelihood::{Stretch, diffuse_log_likelihood};
-use kfdesign::model::{Plant, augment};
+use kfdesign::model::sensor_errors;
 use kfdesign::noise::{NoiseModel, Term};
 use kfdesign::units::Quantity;
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -58,7 +58,7 @@ fn noise([drift, walk]: [bool; 2]) -> NoiseModel {
 fn likelihood_is_that_of_the_normal_vector() {
     let kinds = [[true, false], [false, true], [true, true]];
     for (slope, kinds) in [false, true].into_iter().flat_map(|slope| kinds.map(|kinds| (slope, kinds))) {
-        let model = augment(Plant::Static, Quantity::AngularRate, &noise(kinds), None, DT, 100.0).unwrap();
+        let model = sensor_errors(Quantity::AngularRate, &noise(kinds), None, DT, 100.0).unwrap();
         let value = |k: usize| (0.7 * k as f64).sin() + 0.3 * (0.013 * k as f64).cos() + 2.0;
         let parts: [(u64, std::ops::Range<usize>); 3] = [(0, 0..500), (37, 537..640), (1, 641..738)];
         let mut samples: Vec<Vec<f64>> = parts.iter().map(|(_, range)| range.clone().map(value).collect()).collect();
@@ -79,7 +79,7 @@ fn likelihood_is_that_of_the_normal_vector() {
 /// same to 1e-4 of the variance that is left (e^−20 = 2e-9 of correlation, 700 samples).
 #[test]
 fn a_gap_of_years_is_one_step() {
-    let model = augment(Plant::Static, Quantity::AngularRate, &noise([true, false]), None, DT, 100.0).unwrap();
+    let model = sensor_errors(Quantity::AngularRate, &noise([true, false]), None, DT, 100.0).unwrap();
     let [before, after]: [Vec<f64>; 2] = [0.7, 1.3].map(|f| (0..700).map(|k| (f * f64::from(k)).sin()).collect());
     let value = |missing| {
         let log = [Stretch { missing: 0, samples: &before }, Stretch { missing, samples: &after }];
@@ -91,7 +91,7 @@ fn a_gap_of_years_is_one_step() {
 
 #[test]
 fn too_few_samples_have_no_likelihood() {
-    let model = augment(Plant::Static, Quantity::AngularRate, &noise([true, false]), None, DT, 100.0).unwrap();
+    let model = sensor_errors(Quantity::AngularRate, &noise([true, false]), None, DT, 100.0).unwrap();
     let of = |samples: &[f64], slope| diffuse_log_likelihood(&model, &[Stretch { missing: 0, samples }], slope).value;
     assert!(of(&[], false).is_nan() && of(&[1.0], false).is_nan() && of(&[1.0, 2.0], true).is_nan());
     assert!(of(&[f64::NAN; 9], false).is_nan());

@@ -41,6 +41,7 @@ fn two_rates() -> LinearModel {
         inputs: vec![],
         measurements: states(&["first", "second"]),
         every: vec![1, 3],
+        outputs: vec![],
         f: dmatrix![0.9, 0.1; 0.0, 0.97],
         g: DMatrix::zeros(2, 0),
         h: dmatrix![1.0, 0.0; 0.5, 1.0],

@@ -154,10 +154,48 @@ fn steady_state_without_drift_is_trivial_and_without_sight_is_refused() {
 
     let unseen = model(&[&[1.0]], &[0.0], &[&[1.0]], 1.0, &[0.0], &[&[1.0]]);
     let error = steady_state(&unseen).unwrap_err();
-    assert!(error.to_string().contains("driven states (x0)"), "{error}");
+    assert!(error.to_string().contains("x0 reaches no measurement"), "{error}");
     let growing = model(&[&[1.1]], &[1.0], &[&[0.0]], 1.0, &[0.0], &[&[1.0]]);
     assert!(matches!(steady_state(&growing), Err(SteadyStateError::Growing { .. })));
+    // rates with no common period
+    let mut twice = two_measurements();
+    twice.every = vec![1_000_003, 999_983];
+    assert!(steady_state(&twice).unwrap_err().to_string().contains("more than a million samples"));
+}
+
+fn two_measurements() -> LinearModel {
+    let mut model = drift(0.03, 100.0, 0.05, 1.0);
+    model.measurements.push(kfdesign::model::Named { name: "second".into(), unit: "deg/s".into() });
+    model.h = DMatrix::from_element(2, 1, 1.0);
+    model.r = DMatrix::identity(2, 2) * model.r[0];
+    model.every = vec![1, 1];
+    model
+}
+
+#[test]
+fn a_measurement_at_every_tenth_sample_is_a_filter_of_ten_times_the_step() {
+    // A scalar process is one at any step: closed forms of one hold for the other.
     let mut rare = drift(0.03, 100.0, 0.05, 1.0);
     rare.every = vec![10];
-    assert!(steady_state(&rare).unwrap_err().to_string().contains("every 10 samples"));
+    let mut slow = drift(0.03, 100.0, 0.05, 10.0);
+    slow.r = rare.r.clone();
+    let (found, expected) = (steady_state(&rare).unwrap(), steady_state(&slow).unwrap());
+    assert_eq!((found.period, expected.period), (10, 1));
+    // ten products of doubles
+    for (found, expected) in [
+        (found.gain[0], expected.gain[0]),
+        (found.predicted_covariance[0], expected.predicted_covariance[0]),
+        (found.poles[0].0.powi(10), expected.poles[0].0),
+        (found.settling_time, expected.settling_time),
+    ] {
+        assert!((found / expected - 1.0).abs() < 1e-12, "{found} {expected}");
+    }
+    // two measurements at every sample are one of half the variance
+    let mut one = two_measurements();
+    one.measurements.pop();
+    one.every.pop();
+    one.h = DMatrix::from_element(1, 1, 1.0);
+    one.r = DMatrix::from_element(1, 1, one.r[(0, 0)] / 2.0);
+    let (two, one) = (steady_state(&two_measurements()).unwrap(), steady_state(&one).unwrap());
+    assert!((two.predicted_covariance[0] / one.predicted_covariance[0] - 1.0).abs() < 1e-12);
 }

@@ -73,11 +73,13 @@ pub(super) fn page(view: &View<'_>, replay: Option<&ReplayResult>) -> Page {
 }
 
 fn section(group: &Group<'_>, quantity: Quantity) -> Section {
-    let header = text::sigma_header(group);
+    let header = text::sigma_header(group, quantity);
+    let states = text::state_header(&group.design.model);
+    let states: Vec<&str> = states.iter().map(String::as_str).collect();
     let header: Vec<&str> = header.iter().map(String::as_str).collect();
-    let facts = text::facts(group).into_iter().map(|(label, value)| vec![label.to_string(), value]);
+    let facts = text::facts(group, quantity).into_iter().map(|(label, value)| vec![label.to_string(), value]);
     let mut section = Section::new(group.title())
-        .table("States", &text::STATES, text::state_rows(group, quantity))
+        .table("States", &states, text::state_rows(group, quantity))
         .table("Measurement and loop", &["what", "value"], facts.collect())
         .list(group.report.observability.clone());
     for warning in &group.report.warnings {

@@ -8,7 +8,7 @@ use crate::model::LinearModel;
 use crate::montecarlo::Outcome;
 use crate::params::Params;
 use crate::replay::ReplayResult;
-use crate::tune::{AxisReport, Tuned};
+use crate::tune::{AxisReport, Share, Tuned};
 use crate::units::{Quantity, Unit};
 
 /// Everything that is shown.
@@ -63,31 +63,60 @@ pub(super) fn title(names: &[&str]) -> String {
     }
 }
 
-/// A state's own unit: that of the quantity is shown in the unit of the axis, others in SI.
+/// A state's own unit, see [`shown_unit`].
 pub(super) fn shown(model: &LinearModel, state: usize, quantity: Quantity, unit: &Unit) -> (f64, String) {
-    let si = &model.states[state].unit;
-    if si == quantity.si_unit() { (unit.scale(), unit.to_string()) } else { (1.0, si.clone()) }
+    shown_unit(&model.states[state].unit, quantity, unit)
 }
 
-pub(super) const STATES: [&str; 6] =
-    ["state", "unit", "sigma of P0", "sigma of Q per step", "steady sigma", "steady gain"];
+/// That of the quantity is shown in the unit of the axis, its integral and its derivative (an angle, an acceleration) in the unit that
+/// goes with it, others in SI: scale and text.
+pub(super) fn shown_unit(si: &str, quantity: Quantity, unit: &Unit) -> (f64, String) {
+    if si == quantity.si_unit() {
+        return (unit.scale(), unit.to_string());
+    }
+    let dimension = Unit::parse(si).map(|si| si.dimension());
+    let family = [2, -2].map(|half_powers| unit.times_time(half_powers));
+    match family.into_iter().find(|unit| dimension == Ok(unit.dimension())) {
+        Some(unit) => (unit.scale(), unit.to_string()),
+        None => (1.0, si.to_owned()),
+    }
+}
+
+/// Columns of the table of states; a gain per measurement.
+pub(super) fn state_header(model: &LinearModel) -> Vec<String> {
+    let first = ["state", "unit", "sigma of P0", "sigma of Q per step", "steady sigma"].map(str::to_owned);
+    let gains = model.measurements.iter().map(|m| match model.measurements.len() {
+        1 => "steady gain".to_owned(),
+        _ => format!("gain of {}", m.name),
+    });
+    first.into_iter().chain(gains).collect()
+}
+
 pub(super) const BUDGET: [&str; 3] = ["source", "sigma", "share of variance"];
 
 /// The whole printed text.
 pub(super) fn design(view: &View<'_>) -> String {
     let params = view.params;
-    let mut out = format!(
-        "{}: plant {}, {} Hz, measurement z = sum of the states + white noise\n",
-        view.name, view.tuned.design.plant, params.sample_rate_hz
-    );
+    let mut out =
+        format!("{}: plant {}, {} Hz, {}\n", view.name, view.tuned.design.plant, params.sample_rate_hz, measured(view));
     for group in view.groups() {
         let unit = &group.unit;
-        out.push_str(&format!("\n{}\n{}", group.title(), table(&STATES, &state_rows(&group, params.quantity))));
+        let header = state_header(&group.design.model);
+        let header: Vec<&str> = header.iter().map(String::as_str).collect();
+        out.push_str(&format!("\n{}\n{}", group.title(), table(&header, &state_rows(&group, params.quantity))));
         out.push('\n');
-        for (label, value) in facts(&group) {
+        for (label, value) in facts(&group, params.quantity) {
             out.push_str(&format!("{label:<26}{value}\n"));
         }
         out.push('\n');
+        for budget in &group.report.plant_budgets {
+            let (scale, unit) = shown_unit(&budget.unit, params.quantity, unit);
+            out.push_str(&format!(
+                "Error budget of the {} in steady state (sigma in {unit})\n{}\n",
+                budget.state,
+                table(&BUDGET, &share_rows(&budget.error_budget, scale))
+            ));
+        }
         if group.report.error_budget.is_empty() {
             out.push_str(
                 "Error budget: the error of the drift estimate tends to zero; there is nothing to share out.\n",
@@ -98,7 +127,7 @@ pub(super) fn design(view: &View<'_>) -> String {
                 table(&BUDGET, &budget_rows(&group))
             ));
         }
-        let header = sigma_header(&group);
+        let header = sigma_header(&group, params.quantity);
         let header: Vec<&str> = header.iter().map(String::as_str).collect();
         out.push_str(&format!(
             "\nPredicted sigma of the estimation errors\n{}",
@@ -117,6 +146,22 @@ pub(super) fn design(view: &View<'_>) -> String {
     out
 }
 
+/// What the filter is given.
+pub(super) fn measured(view: &View<'_>) -> String {
+    let Some(model) = view.tuned.design.axes.first().map(|axis| &axis.model) else { return String::new() };
+    if model.outputs.is_empty() {
+        return "measurement z = sum of the states + white noise".into();
+    }
+    let rate = |every: usize| digits(view.params.sample_rate_hz / every as f64);
+    let inputs = model.inputs.iter().map(|input| format!("input {}", input.name));
+    let measurements = model
+        .measurements
+        .iter()
+        .zip(&model.every)
+        .map(|(m, every)| format!("measurement {} at {} Hz", m.name, rate(*every)));
+    inputs.chain(measurements).collect::<Vec<_>>().join(", ")
+}
+
 pub(super) fn state_rows(group: &Group<'_>, quantity: Quantity) -> Vec<Vec<String>> {
     let (model, steady) = (&group.design.model, &group.design.steady_state);
     let p = &steady.predicted_covariance;
@@ -127,25 +172,43 @@ pub(super) fn state_rows(group: &Group<'_>, quantity: Quantity) -> Vec<Vec<Strin
             // after the update: P(k|k) = (I − K H) P(k|k−1)
             let updated = p[(i, i)] - (steady.gain.row(i) * &model.h * p.column(i))[(0, 0)];
             let vanishes = p[(i, i)] == 0.0;
-            vec![
+            let gains = model.measurements.iter().enumerate().map(|(j, measurement)| {
+                digits(steady.gain[(i, j)] * shown_unit(&measurement.unit, quantity, &group.unit).0 / scale)
+            });
+            let mut row = vec![
                 model.states[i].name.clone(),
                 unit,
                 sigma(model.p0[(i, i)]),
                 sigma(model.q[(i, i)]),
                 if vanishes { "tends to 0".into() } else { sigma(updated) },
-                digits(steady.gain[(i, 0)] * group.unit.scale() / scale),
-            ]
+            ];
+            row.extend(gains);
+            row
         })
         .collect()
 }
 
 /// Label and value of what is said in one line each.
-pub(super) fn facts(group: &Group<'_>) -> Vec<(&'static str, String)> {
+pub(super) fn facts(group: &Group<'_>, quantity: Quantity) -> Vec<(&'static str, String)> {
     let (model, steady, report) = (&group.design.model, &group.design.steady_state, group.report);
-    let unit = &group.unit;
-    let root_r = unit.from_si(model.r[(0, 0)].sqrt());
-    vec![
-        ("R", format!("{} ({unit})^2: one sample has sigma {} {unit}", digits(root_r * root_r), digits(root_r))),
+    let mut facts = Vec::new();
+    for (i, measurement) in model.measurements.iter().enumerate() {
+        let (scale, unit) = shown_unit(&measurement.unit, quantity, &group.unit);
+        let root_r = model.r[(i, i)].sqrt() / scale;
+        let which = if model.measurements.len() > 1 { format!(" of {}", measurement.name) } else { String::new() };
+        facts.push((
+            "R",
+            format!("{} ({unit})^2: one sample{which} has sigma {} {unit}", digits(root_r * root_r), digits(root_r)),
+        ));
+    }
+    if steady.period > 1 {
+        let text = format!(
+            "{} samples: steady sigma and gain are those at a sample at which every measurement is taken, after it",
+            steady.period
+        );
+        facts.push(("period", text));
+    }
+    facts.extend([
         ("closed-loop poles", poles_text(&steady.poles, model.dt)),
         (
             "settling time",
@@ -163,20 +226,21 @@ pub(super) fn facts(group: &Group<'_>) -> Vec<(&'static str, String)> {
             ),
         ),
         (
-            "bandwidth",
-            report.bandwidth_hz.map_or_else(
-                || "0: the filter follows no drift".into(),
-                |f| format!("{} Hz (half power of the drift estimate)", digits(f)),
-            ),
-        ),
-        (
             "Riccati equation",
             format!(
                 "relative residual {:.1e}, difference to the eigenvector solution {:.1e}",
                 steady.residual, steady.eigenvector_difference
             ),
         ),
-    ]
+    ]);
+    if model.outputs.is_empty() {
+        let bandwidth = report.bandwidth_hz.map_or_else(
+            || "0: the filter follows no drift".into(),
+            |f| format!("{} Hz (half power of the drift estimate)", digits(f)),
+        );
+        facts.insert(facts.len() - 1, ("bandwidth", bandwidth));
+    }
+    facts
 }
 
 fn pole_text((re, im): (f64, f64), dt: f64) -> String {
@@ -208,8 +272,12 @@ fn poles_text(poles: &[(f64, f64)], dt: f64) -> String {
 }
 
 pub(super) fn budget_rows(group: &Group<'_>) -> Vec<Vec<String>> {
-    let sigma = |variance: f64| digits(group.unit.from_si(variance.sqrt()));
-    let budget = &group.report.error_budget;
+    share_rows(&group.report.error_budget, group.unit.scale())
+}
+
+/// Sigmas in the unit of this scale.
+fn share_rows(budget: &[Share], scale: f64) -> Vec<Vec<String>> {
+    let sigma = |variance: f64| digits(variance.sqrt() / scale);
     let mut rows: Vec<Vec<String>> = budget
         .iter()
         .map(|s| vec![s.source.clone(), sigma(s.variance_si), format!("{:.2} %", 100.0 * s.share)])
@@ -225,9 +293,13 @@ pub(super) fn told(model: &LinearModel) -> impl Iterator<Item = usize> + '_ {
     (0..model.states.len()).filter(move |&i| !together.iter().any(|kind| model.states[i].name.starts_with(kind)))
 }
 
-pub(super) fn sigma_header(group: &Group<'_>) -> Vec<String> {
+pub(super) fn sigma_header(group: &Group<'_>, quantity: Quantity) -> Vec<String> {
     let mut header = vec!["time (s)".to_string()];
-    header.extend(told(&group.design.model).map(|i| group.design.model.states[i].name.clone()));
+    let model = &group.design.model;
+    header.extend(told(model).map(|i| match shown(model, i, quantity, &group.unit).1 {
+        unit if unit == group.unit.text() || model.outputs.is_empty() => model.states[i].name.clone(),
+        unit => format!("{} ({unit})", model.states[i].name),
+    }));
     header.push(format!("whole drift ({})", group.unit));
     header
 }

@@ -7,7 +7,7 @@ use super::form::Form;
 use super::ordinates::Ordinates;
 use super::whittle::{self, Fit};
 use crate::filter::likelihood::{LogLikelihood, Stretch, diffuse_log_likelihood};
-use crate::model::{InitialBias, LinearModel, Plant, augment};
+use crate::model::{InitialBias, LinearModel, sensor_errors};
 use crate::noise::{Kind, NoiseModel};
 use crate::units::Quantity;
 
@@ -59,7 +59,7 @@ impl<'a> Exact<'a> {
         // a model needs a state: for white noise alone one that is zero
         let zero = Some(InitialBias { mean: 0.0, std_dev: 0.0 });
         // the quantity names units, no numbers
-        let with = |bias| augment(Plant::Static, Quantity::AngularRate, &noise, bias, self.data.dt, self.data.span_s());
+        let with = |bias| sensor_errors(Quantity::AngularRate, &noise, bias, self.data.dt, self.data.span_s());
         with(None).or_else(|_| with(zero)).ok()
     }
 

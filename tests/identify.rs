@@ -12,6 +12,7 @@ use kfdesign::noise::{NoiseModel, Term};
 use kfdesign::numerics::random::{StreamId, stream};
 use kfdesign::params::TermEntry;
 use kfdesign::units::Unit;
+use rayon::prelude::*;
 
 /// The reference sensor in deg, s (0.0562 deg/s/√Hz, 0.02806 deg/s, 193.93 s).
 const N: f64 = 0.0562;
@@ -72,50 +73,45 @@ fn study_runs() -> u64 {
     std::env::var("KFDESIGN_STUDY_RUNS").ok().and_then(|v| v.parse().ok()).unwrap_or(400)
 }
 
-/// Bias, efficiency and coverage of the Allan fit on white noise + Gauss-Markov.
+/// Bias, efficiency and coverage of three methods on the same logs of the reference sensor at 1 Hz, model given.
+///
+/// A log in which a drift parameter is not identified is counted and left out.
 #[test]
 #[ignore = "a study of minutes that prints figures, not a check"]
-fn identify_study_of_intervals() {
+fn identify_study_of_methods() {
     let runs = study_runs();
     let forced = parse_model("white+gm").unwrap();
-    // √ of the diagonal of the inverse Whittle information, ln N at 1 Hz, ln σ, ln Tc (formulas: 2 h; scales as T^(-1/2))
-    let bound_2h = [8.577e-3, 0.11871, 0.28511];
-    for hours in [1.0_f64, 2.0, 10.0] {
+    for hours in [1.0_f64, 2.0, 4.0, 10.0] {
         let samples = (hours * 3600.0) as usize;
-        let started = Instant::now();
-        let mut errors: Vec<[f64; 3]> = Vec::new();
-        let mut covered = [0; 3];
-        let mut good_fits = 0;
-        for run in 0..runs {
-            let rate = log(&[white(N), gauss_markov(SIGMA, TC)], samples, 1.0, 11, run);
-            let found = identify(&rate, 1.0, &forced);
-            good_fits += usize::from(found.fit_p_value >= 0.01);
-            if found.model.terms.len() < 2 {
-                continue;
-            }
-            let truth = [N.ln(), SIGMA.ln(), TC.ln()];
-            let estimate = logs(&found.model);
-            errors.push([0, 1, 2].map(|i| estimate[i] - truth[i]));
-            for (i, interval) in intervals(&found).into_iter().enumerate() {
-                covered[i] += usize::from(interval[0].ln() <= truth[i] && truth[i] <= interval[1].ln());
-            }
-        }
-        let n = errors.len() as f64;
-        println!(
-            "white+gm forced, {hours} h at 1 Hz, {runs} logs, {} with all parameters identified, {good_fits} with p >= 0.01, {:.2} s a log",
-            errors.len(),
-            started.elapsed().as_secs_f64() / runs as f64
-        );
-        for (i, name) in ["N", "sigma", "Tc"].iter().enumerate() {
-            let mean = errors.iter().map(|e| e[i]).sum::<f64>() / n;
-            let sd = (errors.iter().map(|e| (e[i] - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
-            let rms = (errors.iter().map(|e| e[i] * e[i]).sum::<f64>() / n).sqrt();
-            let bound = bound_2h[i] * (2.0 / hours).sqrt();
+        let bound = likelihood::bound(N, SIGMA, TC, samples, 1.0);
+        for method in [Method::Likelihood, Method::Allan, Method::Gmwm] {
+            let started = Instant::now();
+            let one = |run: u64| {
+                let rate = log(&[white(N), gauss_markov(SIGMA, TC)], samples, 1.0, 35, run);
+                let found = identify_axis("x", &rate, 1.0, &Unit::parse("rad/s").unwrap(), method, &forced).unwrap();
+                let q_c = |[n, sigma, tc]: [f64; 3]| [n, sigma, tc, sigma + 0.5 * (2.0_f64.ln() - tc)];
+                let (truth, estimate) = (q_c([N, SIGMA, TC].map(f64::ln)), q_c(logs(&found.model)));
+                let covered = intervals(&found).map(|i| i.map(f64::ln));
+                let covered = [0, 1, 2].map(|i| covered[i][0] <= truth[i] && truth[i] <= covered[i][1]);
+                (found.model.terms.len() == 2).then(|| ([0, 1, 2, 3].map(|i| estimate[i] - truth[i]), covered))
+            };
+            let found: Vec<([f64; 4], [bool; 3])> = (0..runs).into_par_iter().filter_map(one).collect();
+            let n = found.len() as f64;
             println!(
-                "  {name:6} mean error {mean:+.4}  sd {sd:.4}  rms {rms:.4}  bound {bound:.4}  efficiency {:.2}  coverage {:.3}",
-                (bound / sd).powi(2),
-                covered[i] as f64 / n
+                "{hours} h, {}: {n} of {runs} identified, {:.3} s a log",
+                method.name(),
+                started.elapsed().as_secs_f64() / runs as f64
             );
+            for (i, name) in ["N", "sigma", "Tc", "q_c"].iter().enumerate() {
+                let mean = found.iter().map(|(e, _)| e[i]).sum::<f64>() / n;
+                let sd = (found.iter().map(|(e, _)| (e[i] - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+                let covered = found.iter().filter(|(_, c)| c.get(i) == Some(&true)).count() as f64 / n;
+                println!(
+                    "  {name:6} mean error/sd {:+.2}  sd {sd:.4}  efficiency {:.2}  coverage {covered:.3}",
+                    mean / sd,
+                    (bound[i] / sd).powi(2)
+                );
+            }
         }
     }
 }
@@ -149,27 +145,41 @@ fn identify_study_of_model_choice() {
     }
 }
 
-/// What the recipe reads off logs of its own model.
+/// What the recipe reads off logs of its own model, against the Cramér-Rao bound: errors of ln N, ln σ, ln Tc, ln q_c.
+///
+/// A log without a maximum of the moving-averaged curve has no Tc; it is counted and left out of Tc and q_c.
 #[test]
 #[ignore = "a study of minutes that prints figures, not a check"]
 fn identify_study_of_the_recipe() {
-    let runs = study_runs();
+    let runs = study_runs().min(200);
     let unit = Unit::parse("deg/s").unwrap();
-    let (mut read, mut ratios) = (0, Vec::new());
-    for run in 0..runs.min(200) {
-        let rate: Vec<f64> =
-            log(&[white(N), gauss_markov(SIGMA, TC)], 720_000, 0.01, 8, run).iter().map(|x| unit.to_si(*x)).collect();
-        let found = graphical(&rate, 0.01);
-        let [density, _, std_dev, time, _] = [0, 1, 2, 3, 4].map(|i| found.steps[i].value);
-        read += usize::from(time.is_some());
-        ratios.push([density.unwrap() / N, std_dev.unwrap() / SIGMA, time.map_or(f64::NAN, |t| t / TC)]);
-    }
-    println!("graphical recipe, 2 h at 100 Hz, {} logs: a maximum in {read}", ratios.len());
-    for (i, name) in ["N", "sigma_GM", "Tc"].iter().enumerate() {
-        let mut errors: Vec<f64> = ratios.iter().map(|r| r[i].ln()).filter(|e| e.is_finite()).collect();
-        errors.sort_by(f64::total_cmp);
-        let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
-        println!("  {name:8} median read/true {:.3}  rms of ln(read/true) {rms:.4}", errors[errors.len() / 2].exp());
+    let truth = [N, SIGMA, TC, SIGMA * (2.0 / TC).sqrt()].map(f64::ln);
+    for hours in [1.0_f64, 2.0, 4.0, 10.0] {
+        let samples = (hours * 360_000.0) as usize;
+        let one = |run: u64| {
+            let mut rate = log(&[white(N), gauss_markov(SIGMA, TC)], samples, 0.01, 8, run);
+            rate.iter_mut().for_each(|x| *x = unit.to_si(*x));
+            let found = graphical(&rate, 0.01);
+            let [density, _, std_dev, time, _] =
+                [0, 1, 2, 3, 4].map(|i| found.steps[i].value.map_or(f64::NAN, f64::ln));
+            let read = [density, std_dev, time, std_dev + 0.5 * (2.0_f64.ln() - time)];
+            [0, 1, 2, 3].map(|i| read[i] - truth[i])
+        };
+        let errors: Vec<[f64; 4]> = (0..runs).into_par_iter().map(one).collect();
+        let bound = likelihood::bound(N, SIGMA, TC, samples, 0.01);
+        for (i, name) in ["N", "sigma", "Tc", "q_c"].iter().enumerate() {
+            let known: Vec<f64> = errors.iter().map(|e| e[i]).filter(|e| e.is_finite()).collect();
+            let n = known.len() as f64;
+            let mean = known.iter().sum::<f64>() / n;
+            let mean_square = known.iter().map(|e| e * e).sum::<f64>() / n;
+            let variance = (mean_square - mean * mean) * n / (n - 1.0);
+            println!(
+                "recipe, {hours} h at 100 Hz, {name}: {n} of {runs} read, mean error {mean:+.3}, sd {:.3}, bound²/variance {:.3}, bound²/mean square {:.4}",
+                variance.sqrt(),
+                bound[i].powi(2) / variance,
+                bound[i].powi(2) / mean_square
+            );
+        }
     }
 }
 
@@ -330,6 +340,19 @@ fn band_limited_log_loses_its_shortest_averaging_times_only() {
 
 fn graphical(rate: &[f64], dt: f64) -> Identified {
     identify_axis("x", rate, dt, &Unit::parse("deg/s").unwrap(), Method::Graphical, &ModelChoice::Auto).unwrap()
+}
+
+/// Thirty hours of the reference sensor: after its maximum the curve falls below its first minimum again, also with slope −1/2. The maximum is read all
+/// the same (its τ scatters by some 17 %, within a factor of 2: 5e-5 by a normal law of the logarithm), and N before the minimum (0.2 %, bound 5 %).
+#[test]
+fn recipe_reads_the_maximum_of_a_long_log() {
+    let unit = Unit::parse("deg/s").unwrap();
+    let mut rate = log(&[white(N), gauss_markov(SIGMA, TC)], 108_000, 1.0, 8, 1);
+    rate.iter_mut().for_each(|x| *x = unit.to_si(*x));
+    let found = graphical(&rate, 1.0);
+    let [density, _, _, time] = [0, 1, 2, 3].map(|i| found.steps[i].value.unwrap());
+    assert!((density / N - 1.0).abs() < 0.05, "{density}");
+    assert!((0.5..2.0).contains(&(time / TC)), "{time}");
 }
 
 /// Two hours of the reference sensor at 100 Hz, values in deg/s. The smoothed log has variance σ² + N²/(100 dt): the recipe's

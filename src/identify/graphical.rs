@@ -57,7 +57,7 @@ struct Reading {
     density: Option<f64>,
     std_dev: Option<f64>,
     minimum: Option<AllanPoint>,
-    /// Maximum after the minimum that is not the end of the curve.
+    /// Maximum after the minimum, not the end of the curve.
     peak: Option<AllanPoint>,
 }
 
@@ -125,16 +125,35 @@ pub(super) fn identify(name: &str, rate: &[f64], dt: f64, display: &Unit) -> Res
 fn read(curve: &AllanCurve, rate: &[f64]) -> Reading {
     let readable = |p: &&AllanPoint| p.m as usize <= curve.samples / FEWEST_AVERAGES && p.deviation > 0.0;
     let points: Vec<&AllanPoint> = curve.points.iter().filter(readable).collect();
-    let minimum = points.iter().copied().min_by(|a, b| a.deviation.total_cmp(&b.deviation));
-    let after = |p: &&&AllanPoint| minimum.is_some_and(|m| p.tau_s > m.tau_s);
-    let peak = points.iter().filter(after).copied().max_by(|a, b| a.deviation.total_cmp(&b.deviation));
-    let last = points.last().map(|p| p.m);
+    let peak = peak(&points);
+    // a long log falls below its first minimum again after the maximum, with slope −1/2 as well
+    let before = &points[..peak.unwrap_or(points.len())];
+    let minimum = lowest(before).map(|i| before[i]).filter(|m| points.last().is_some_and(|last| m.m != last.m));
     Reading {
-        density: white_line(&points),
+        density: white_line(before),
         std_dev: smoothed_std_dev(rate, WINDOW),
-        minimum: minimum.filter(|m| Some(m.m) != last).cloned(),
-        peak: peak.filter(|p| Some(p.m) != last).cloned(),
+        minimum: minimum.cloned(),
+        peak: peak.map(|j| points[j].clone()),
     }
+}
+
+fn lowest(points: &[&AllanPoint]) -> Option<usize> {
+    (0..points.len()).min_by(|i, j| points[*i].deviation.total_cmp(&points[*j].deviation))
+}
+
+/// The maximum after the minimum: the point that rises most above the lowest one before it, unless it is the last of all or
+/// rises by less than its own standard deviation, 1/√(2 edf) of the deviation.
+fn peak(points: &[&AllanPoint]) -> Option<usize> {
+    let mut below = f64::INFINITY;
+    let mut found: Option<(f64, usize)> = None;
+    for (j, point) in points.iter().enumerate() {
+        let rise = (point.deviation / below).ln();
+        if found.is_none_or(|(most, _)| rise > most) && rise > (2.0 * point.edf).sqrt().recip() {
+            found = Some((rise, j));
+        }
+        below = below.min(point.deviation);
+    }
+    found.map(|(_, j)| j).filter(|j| j + 1 < points.len())
 }
 
 /// N: where the line of slope −1/2 through the −1/2 stretch of the curve crosses 1 s; points weigh by their degrees of

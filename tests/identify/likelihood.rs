@@ -34,7 +34,7 @@ fn ln_estimate(found: &Identified) -> Option<[f64; 4]> {
 
 /// Bound of the standard deviation of ln N, ln σ, ln Tc, ln q_c from n samples of white noise + Gauss-Markov:
 /// I_ij = (n/2π) ∫₀^π ∂_i ln S ∂_j ln S dω, S = N²/dt + σ²(1 − φ²)/((1 − φ)² + 4φ sin²(ω/2)) (Whittle 1953), in closed derivatives.
-fn bound(n: f64, sigma: f64, tc: f64, samples: usize, dt: f64) -> [f64; 4] {
+pub(super) fn bound(n: f64, sigma: f64, tc: f64, samples: usize, dt: f64) -> [f64; 4] {
     let phi = (-dt / tc).exp();
     let by_tc = phi * dt / tc;
     let mut information = Matrix3::zeros();
@@ -265,6 +265,28 @@ fn what_says_nothing_is_refused() {
     let line = parse_model("white+osc").unwrap();
     let quiet = (1..20).find_map(|seed| attempt(&log(&[white(1.0)], 100, 0.01, seed, 0), 0.01, &line).err()).unwrap();
     assert_eq!(quiet.to_string(), "x: no line stands out of the spectrum: leave osc out of --model");
+}
+
+/// A Gauss-Markov process that forgets within a sample or two: the log sets no lower limit to its time, and the filter needs it all the same. The variance
+/// of a sample under what is written is that of the log (known to √(2·1.6/n) = 0.9 %, bound 5 %).
+#[test]
+fn fast_gauss_markov_process_is_written() {
+    let (n, dt) = (40_000, 0.01);
+    let rate = log(&[white(0.002), gauss_markov(0.03, 0.015)], n, dt, 30, 0);
+    let found = identify(&rate, dt, &parse_model("white+gm").unwrap());
+    let variance: f64 = found
+        .model
+        .terms
+        .iter()
+        .map(|term| match *term {
+            Term::White { density } => density * density / dt,
+            Term::GaussMarkov { std_dev, .. } => std_dev * std_dev,
+            _ => 0.0,
+        })
+        .sum();
+    let measured = rate.iter().map(|x| x * x).sum::<f64>() / n as f64;
+    assert!((variance / measured - 1.0).abs() < 0.05, "{variance} of {measured}: {:?}", found.model);
+    assert!(found.not_identified.iter().any(|n| n.term.ends_with("correlation_time")), "{:?}", found.not_identified);
 }
 
 /// The same bits, however many threads there are.

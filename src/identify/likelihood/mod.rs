@@ -42,6 +42,8 @@ const CLOSE: f64 = 6.0;
 const CLEARLY: f64 = 3.0;
 /// Candidates whose parameters are looked at, at most.
 const LOOKED_AT: usize = 12;
+/// A Gauss-Markov process that forgets within so many samples is a matter of the sensor's bandwidth, not drift.
+const FAST: f64 = 10.0;
 /// Candidates that are tried on the part of the log they have not seen.
 const HELD_OUT: usize = 6;
 /// Standard deviation of a logarithm below which second differences of the exact likelihood give its interval.
@@ -76,6 +78,9 @@ pub(super) fn identify(
         })
         .collect();
     fits.sort_by(|a, b| score(&a.0, &data).total_cmp(&score(&b.0, &data)));
+    if !forced && fits.iter().all(|(fit, known)| !unknown(&data, fit, known).is_empty()) {
+        fits.extend(fits.first().and_then(|best| reduced(&data, best)));
+    }
     let held_out = held_out(rate, &data, &fits);
     let chosen = if forced { 0 } else { choice_of(&data, &fits, &held_out) };
     let Some((on_cosines, known)) = fits.get(chosen) else {
@@ -117,7 +122,7 @@ pub(super) fn identify(
         log_likelihood: Some(fit.log_likelihood),
         held_out: held_out.get(i).copied().flatten(),
         score: score(fit, &data),
-        identified: unknown(fit, known).is_empty(),
+        identified: unknown(&data, fit, known).is_empty(),
         chosen: i == chosen,
     };
     let candidates = fits.iter().enumerate().map(candidate).collect();
@@ -196,10 +201,28 @@ fn forms(kinds: &[Kind]) -> Vec<Form> {
     all
 }
 
-/// Numbers of the drift parameters whose interval says nothing. What is faster is judged by the filter's innovations, not by its numbers.
-fn unknown(fit: &Fit, known: &[Precision]) -> Vec<usize> {
-    let drift = |i: &usize| fit.form.pieces()[fit.form.roles()[*i].0].kind().is_drift();
+/// Numbers of the drift parameters whose interval says nothing. What is faster is judged by the filter's innovations, not by its numbers: also a
+/// Gauss-Markov process that surely forgets within [`FAST`] samples.
+fn unknown(data: &Ordinates, fit: &Fit, known: &[Precision]) -> Vec<usize> {
+    let roles = fit.form.roles();
+    let fast = |i: usize| {
+        let time = roles.iter().position(|role| *role == (roles[i].0, Role::CorrelationTime));
+        time.and_then(|time| known[time].upper).is_some_and(|upper| upper.exp() < FAST * data.dt)
+    };
+    let drift = |i: &usize| fit.form.pieces()[roles[*i].0].kind().is_drift() && !fast(*i);
     wide(known).into_iter().filter(drift).collect()
+}
+
+/// The best fit without the drift processes that its log does not tell, their parameters found anew.
+fn reduced(data: &Ordinates, best: &(Fit, Vec<Precision>)) -> Option<(Fit, Vec<Precision>)> {
+    let mut found = best.clone();
+    while let Some(last) = unknown(data, &found.0, &found.1).pop() {
+        let (form, logs) = found.0.form.without(&found.0.logs, found.0.form.roles()[last].0);
+        let fit = whittle::climb_all(data, &form, &logs)?;
+        let known = precisions(data, &fit);
+        found = (fit, known);
+    }
+    Some(found)
 }
 
 /// Numbers of all parameters whose interval says nothing.
@@ -219,7 +242,7 @@ struct Found {
 
 /// The terms but for drift that is not identified.
 fn known_terms(data: &Ordinates, fit: &Fit, known: &[Precision]) -> Vec<Found> {
-    let unknown = unknown(fit, known);
+    let unknown = unknown(data, fit, known);
     let mut first = 0;
     let mut found = Vec::new();
     for (piece, own) in fit.form.split(&fit.logs) {
@@ -303,7 +326,7 @@ fn goodness(data: &Ordinates, fit: &Fit) -> f64 {
 /// The best score among models whose parameters are known; a model that is close in score takes its place when it foretells the last third of the log
 /// clearly better.
 fn choice_of(data: &Ordinates, fits: &[(Fit, Vec<Precision>)], held_out: &[Option<f64>]) -> usize {
-    let identified = |i: &usize| unknown(&fits[*i].0, &fits[*i].1).is_empty();
+    let identified = |i: &usize| unknown(data, &fits[*i].0, &fits[*i].1).is_empty();
     let Some(first) = (0..fits.len()).find(identified) else { return 0 };
     let foretold = |i: usize| held_out.get(i).copied().flatten();
     let Some(known) = foretold(first) else { return first };
@@ -460,7 +483,7 @@ impl Words<'_> {
 
     fn warnings(&self, fit: &Fit, p_value: f64) -> Vec<String> {
         let mut warnings = Vec::new();
-        if fit.decrement > 1e-2 || fit.decrement.is_nan() {
+        if fit.decrement > whittle::WELL || fit.decrement.is_nan() {
             warnings.push(format!(
                 "the search for the maximum has not converged (another step would gain {} in ln L)",
                 digits(0.5 * fit.decrement)

@@ -6,7 +6,7 @@
 //! inverse is the Cramér-Rao bound.
 //! Sources: Whittle 1953; Kay 1993, section 3.11 (asymptotic bound).
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use slsqp::{Func, StopTols, minimize};
 
 use super::super::shape::Role;
@@ -20,6 +20,10 @@ const SHORTEST: f64 = 0.3;
 const SHORTEST_DRIFT: f64 = 2.0;
 /// And at most so many lengths of the log; beyond it a Gauss-Markov process is a random walk.
 const LONGEST: f64 = 10.0;
+/// A maximum is found when another step would gain half of this in ln L.
+pub(super) const WELL: f64 = 1e-2;
+/// Steps of the scoring at most.
+const SCORINGS: usize = 60;
 /// Step of numerical derivatives by a logarithm.
 const STEP: f64 = 1e-4;
 
@@ -313,7 +317,42 @@ pub(super) fn climb(data: &Ordinates, form: &Form, start: &[f64], free: &[usize]
             break;
         }
     }
-    best.is_finite().then(|| finish(data, form, at, best, free, &bounds))
+    let found = finish(data, form, at, best, free, &bounds);
+    best.is_finite().then(|| if found.decrement > WELL { scored(data, found, free, &bounds) } else { found })
+}
+
+/// Carried on by Fisher's scoring with damping (Marquardt 1963), for overlapping lines, of which SLSQP's picture of the curvature is too poor.
+fn scored(data: &Ordinates, start: Fit, free: &[usize], bounds: &[(f64, f64)]) -> Fit {
+    let mut best = start;
+    let mut damping = 1e-3;
+    for _ in 0..SCORINGS {
+        let held = Held::new(data, &best.form, &best.logs, free);
+        let mut gradient = vec![0.0; best.logs.len()];
+        objective(data, &best.form, &best.logs, &held, Some(&mut gradient));
+        let information = information(data, &best.form, &best.logs, &held);
+        let damped = DMatrix::from_fn(free.len(), free.len(), |i, k| {
+            information[(free[i], free[k])] * if i == k { 1.0 + damping } else { 1.0 }
+        });
+        let g = DVector::from_iterator(free.len(), free.iter().map(|i| -gradient[*i]));
+        let Some(step) = nalgebra::Cholesky::new(damped).map(|c| c.solve(&g)) else { break };
+        let mut logs = best.logs.clone();
+        for (i, by) in free.iter().zip(step.iter()) {
+            logs[*i] = (logs[*i] + by).clamp(bounds[*i].0, bounds[*i].1);
+        }
+        let value = objective(data, &best.form, &logs, &held, None);
+        if value < -best.log_likelihood {
+            best = finish(data, &best.form, logs, value, free, bounds);
+            damping /= 10.0;
+            if best.decrement < WELL {
+                break;
+            }
+        } else if damping > 1e6 {
+            break;
+        } else {
+            damping *= 10.0;
+        }
+    }
+    best
 }
 
 /// The same by all logarithms.

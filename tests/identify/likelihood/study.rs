@@ -17,6 +17,11 @@ fn runs(usual: u64) -> u64 {
     std::env::var("KFDESIGN_STUDY_RUNS").ok().and_then(|v| v.parse().ok()).unwrap_or(usual)
 }
 
+/// Seed of a study: other logs of the same kind.
+fn seed(usual: u64) -> u64 {
+    std::env::var("KFDESIGN_STUDY_SEED").ok().and_then(|v| v.parse().ok()).unwrap_or(usual)
+}
+
 fn mean_and_sd(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
@@ -33,13 +38,14 @@ fn likelihood_study_of_efficiency() {
     let truth = [N, SIGMA, TC, SIGMA * (2.0 / TC).sqrt()].map(f64::ln);
     println!("| log | parameter | logs | mean error/sd | sd | bound | (bound/sd)² | median printed bound/formula |");
     println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
-    for hours in [1.0_f64, 2.0, 4.0, 10.0] {
+    let only = std::env::var("KFDESIGN_STUDY_CASE").unwrap_or_default();
+    for hours in [1.0_f64, 2.0, 4.0, 10.0].into_iter().filter(|h| format!("{h} h").contains(&only)) {
         let samples = (hours * 3600.0) as usize;
         let started = Instant::now();
         let found: Vec<(Identified, [f64; 4])> = (0..runs)
             .into_par_iter()
             .filter_map(|run| {
-                let rate = log(&[white(N), gauss_markov(SIGMA, TC)], samples, 1.0, 31, run);
+                let rate = log(&[white(N), gauss_markov(SIGMA, TC)], samples, 1.0, seed(31), run);
                 let found = identify(&rate, 1.0, &forced);
                 ln_estimate(&found).map(|estimate| (found, estimate))
             })

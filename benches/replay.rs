@@ -47,7 +47,14 @@ fn axis(name: &str) -> AxisDesign {
         residual: 0.0,
         eigenvector_difference: 0.0,
     };
-    let noise = AxisParams { name: name.into(), bias: None, turn_on_bias: None, terms: vec![], not_identified: vec![] };
+    let noise = AxisParams {
+        name: name.into(),
+        bias: None,
+        turn_on_bias: None,
+        temperature: None,
+        terms: vec![],
+        not_identified: vec![],
+    };
     AxisDesign { name: name.into(), model, steady_state, noise }
 }
 

@@ -40,6 +40,7 @@ pub fn params(terms: &[Term]) -> Params {
             name: "x".into(),
             bias: None,
             turn_on_bias: None,
+            temperature: None,
             terms: terms.iter().map(entry).collect(),
             not_identified: vec![],
         }],

@@ -4,6 +4,7 @@ mod command;
 mod gmwm;
 mod likelihood;
 mod plan;
+mod temperature;
 
 use std::time::Instant;
 

@@ -75,6 +75,7 @@ fn writing_and_reading_gives_the_same_document() {
                 name: "accel x".into(),
                 bias: Some(measured(-0.1, "mg", Some([-0.3, 0.1]))),
                 turn_on_bias: Some(measured(3.0, "mg", None)),
+                temperature: None,
                 terms: vec![
                     TermEntry::Quantization { coefficient: measured(1e-6, "m/s", None) },
                     TermEntry::White { density: measured(0.1 + 0.2, "µg/√Hz", Some([0.1, 0.7])) },
@@ -105,6 +106,7 @@ fn writing_and_reading_gives_the_same_document() {
                 name: "y".into(),
                 bias: None,
                 turn_on_bias: None,
+                temperature: None,
                 terms: vec![],
                 not_identified: vec![NotIdentified { term: "white".into(), reason: "why".into(), needed_log_s: None }],
             },

@@ -53,7 +53,14 @@ fn axis(name: &str, dt: f64, q: f64, phi: f64, r: f64, x0: [f64; 2], p0: [f64; 2
             residual: 0.0,
             eigenvector_difference: 0.0,
         },
-        noise: AxisParams { name: name.into(), bias: None, turn_on_bias: None, terms: vec![], not_identified: vec![] },
+        noise: AxisParams {
+            name: name.into(),
+            bias: None,
+            turn_on_bias: None,
+            temperature: None,
+            terms: vec![],
+            not_identified: vec![],
+        },
     }
 }
 

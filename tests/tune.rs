@@ -39,6 +39,7 @@ fn sensor(rate_hz: f64, terms: Vec<TermEntry>, turn_on: Option<f64>) -> Params {
             name: "x".into(),
             bias: None,
             turn_on_bias: turn_on.map(|b| measured(b, "deg/s")),
+            temperature: None,
             terms,
             not_identified: vec![],
         }],

@@ -2,6 +2,7 @@
 
 mod sight;
 mod tables;
+mod temperature;
 
 use std::path::{Path, PathBuf};
 
@@ -22,7 +23,7 @@ use crate::identify::{
     Candidate, Identified, Method, ModelChoice, Precision, SharedTime, TimeProfile, identify_axis, identify_logs,
     parse_model, shared_time,
 };
-use crate::input::InputKind;
+use crate::input::{InputKind, TemperatureColumn};
 use crate::params::{NotIdentified, Params, Source};
 use crate::replay::axes::RATE_TOLERANCE;
 use crate::signal::{LogCheck, Recording, upsets};
@@ -53,6 +54,10 @@ pub struct Args {
     /// Leave outliers out: samples farther from their surroundings than noise goes
     #[arg(long)]
     robust: bool,
+    /// Temperature column, beside whose regression the parameters are shown: name or 1-based number, with the unit if the header does not say it
+    /// (temp:degC); `none` reads none [default: found by name]. The parameters written are those without
+    #[arg(long, value_name = "COLUMN")]
+    temperature: Option<String>,
     /// One HTML page with tables and figures
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
@@ -131,6 +136,9 @@ struct AxisDocument<'a> {
     exact_log_likelihood: Option<f64>,
     steps: &'a [Step],
     warnings: &'a [String],
+    /// Likelihood only, where the log has a temperature.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    temperature: Option<temperature::Document<'a>>,
     allan: CurveDocument,
     /// Wavelet moments only.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -165,6 +173,7 @@ struct CurveDocument {
 struct Axis {
     measured: AxisCurve,
     found: Identified,
+    warmth: Option<temperature::Shown>,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
@@ -181,7 +190,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     for output in [&args.output, &args.report, &args.plot].into_iter().flatten() {
         args.logs.iter().try_for_each(|log| atomic::check_output(output, log))?;
     }
-    let options = args.reading.options()?;
+    let mut options = args.reading.options()?;
+    options.temperature = match args.temperature.as_deref().map(str::trim) {
+        Some("none") => TemperatureColumn::Ignored,
+        None if args.method != MethodArg::Likelihood => TemperatureColumn::Ignored,
+        None => TemperatureColumn::Found,
+        Some(column) if args.method == MethodArg::Likelihood => TemperatureColumn::Named(column.into()),
+        Some(column) => bail!("--temperature {column}: only --method likelihood has a regression on temperature"),
+    };
     let mut readings = Vec::with_capacity(args.logs.len());
     for log in &args.logs {
         let (recording, check) = crate::input::read(log, &options)?;
@@ -194,11 +210,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if parts.is_empty() {
         bail!("{}: no axis to work on", args.logs[0].display());
     }
+    let warmth = temperature::Warmth::new(&readings, options.kind);
     let bar = progress(parts.len() as u64, "identify");
     let axes: Vec<Axis> = parts
         .into_par_iter()
         .map(|part| {
-            let axis = identify(part, dt, args, &choice, &readings);
+            let axis = identify(part, dt, args, &choice, &readings, warmth.as_ref());
             bar.inc(1);
             axis
         })
@@ -285,6 +302,7 @@ fn identify(
     args: &Args,
     choice: &ModelChoice,
     readings: &[(Recording, LogCheck)],
+    warmth: Option<&temperature::Warmth>,
 ) -> anyhow::Result<Axis> {
     // the first of the longest
     let longest = (0..parts.len()).rev().max_by_key(|i| parts[*i].rate.len()).unwrap_or(0);
@@ -297,6 +315,8 @@ fn identify(
     } else {
         identify_axis(&part.name, &part.rate, dt, &part.unit, method, choice)?
     };
+    let warmth = warmth.zip(found.fitted.as_ref()).map(|(warmth, fitted)| warmth.shown(fitted, &parts, longest, dt));
+    found.params.temperature = warmth.as_ref().and_then(temperature::Shown::record);
     if dropped > 0 {
         found.warnings.push(format!("{dropped} outliers were left out"));
     }
@@ -310,7 +330,7 @@ fn identify(
     }
     let part = parts.swap_remove(longest);
     let measured = AxisCurve { stretch: part, curve: found.curve.clone(), fit: Ok(found.model.clone()) };
-    Ok(Axis { measured, found })
+    Ok(Axis { measured, found, warmth })
 }
 
 /// What is in the log that no model of noise has.
@@ -344,7 +364,7 @@ fn upset_words(part: &Stretch, dt: f64, robust: bool) -> Vec<String> {
 }
 
 fn wavelets(axis: &Axis) -> WaveletDocument {
-    let Axis { measured, found } = axis;
+    let Axis { measured, found, .. } = axis;
     let unit = &measured.stretch.unit;
     let square = |si: f64| unit.from_si(unit.from_si(si));
     let levels = wavelet::levels(&found.curve);
@@ -366,7 +386,7 @@ fn document<'a>(
     method: Method,
 ) -> Document<'a> {
     let axis = |axis: &'a Axis| {
-        let Axis { measured, found } = axis;
+        let Axis { measured, found, .. } = axis;
         let points = &found.curve.points;
         let unit = &measured.stretch.unit;
         CurveDocument {
@@ -393,6 +413,7 @@ fn document<'a>(
         exact_log_likelihood: a.found.exact_log_likelihood,
         steps: &a.found.steps,
         warnings: &a.found.warnings,
+        temperature: a.warmth.as_ref().map(temperature::Shown::document),
         allan: axis(a),
         wavelet_variance: (method == Method::Gmwm).then(|| wavelets(a)),
     });
@@ -438,6 +459,12 @@ fn text(axis: &Axis, quantity: Quantity) -> String {
             out += &format!("  {sentence}\n");
         }
     }
+    if let Some(warmth) = &axis.warmth {
+        out += &format!("\n{}\n", warmth.sentences().join("\n"));
+        if let Some(pairs) = warmth.table() {
+            out += &format!("{}:\n{}", pairs.caption, table(pairs.header, &pairs.rows));
+        }
+    }
     if !axis.found.not_identified.is_empty() {
         out += "\nNot identified:\n";
         for sentence in axis.found.not_identified.iter().map(not_identified) {
@@ -452,7 +479,7 @@ fn text(axis: &Axis, quantity: Quantity) -> String {
 
 /// "gyro_x: white+gm, 720000 samples in 2 h".
 fn headline(axis: &Axis) -> String {
-    let Axis { measured, found } = axis;
+    let Axis { measured, found, .. } = axis;
     let samples = measured.stretch.rate.len();
     let span = duration(samples as f64 * found.curve.dt);
     match found.candidates.iter().find(|c| c.chosen) {

@@ -2,7 +2,7 @@
 
 use clap::{Args, ValueEnum};
 
-use crate::input::{InputKind, LogOptions};
+use crate::input::{InputKind, LogOptions, TemperatureColumn};
 use crate::signal::LogCheck;
 use crate::units::{Quantity, Unit};
 
@@ -72,6 +72,7 @@ impl LogFlags {
                 SensorArg::Gyro => Quantity::AngularRate,
                 SensorArg::Accel => Quantity::SpecificForce,
             }),
+            temperature: TemperatureColumn::Ignored,
         })
     }
 }

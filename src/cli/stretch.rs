@@ -20,6 +20,8 @@ pub(super) struct Stretch {
     pub(super) phase: Option<Vec<f64>>,
     /// Samples of the log outside the stretch.
     pub(super) left_out: usize,
+    /// Where the stretch is in the log.
+    range: Range<usize>,
     /// The whole log: how many samples are missing before, then samples, of which some may not be finite; empty where `rate` is all.
     whole: Vec<(u64, Vec<f64>)>,
 }
@@ -55,6 +57,16 @@ impl Stretch {
         }
     }
 
+    /// What stands beside the samples of the axis in the log: beside the stretch, and piece by piece as [`Stretch::pieces`].
+    pub(super) fn beside(&self, values: &[f64], gaps: &[Gap], kind: InputKind) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let own = beside(values.get(self.range.clone()).unwrap_or_default(), kind);
+        let whole = match self.left_out {
+            0 => vec![own.clone()],
+            _ => pieces(values, gaps, kind, |own| beside(own, kind)).into_iter().map(|(_, own)| own).collect(),
+        };
+        (own, whole)
+    }
+
     /// All of the log, piece by piece.
     pub(super) fn pieces(&self) -> Vec<filter::likelihood::Stretch<'_>> {
         let piece = |missing, samples| filter::likelihood::Stretch { missing, samples };
@@ -75,34 +87,42 @@ pub(super) fn stretches(recording: &Recording, kind: InputKind) -> Vec<Stretch> 
         .map(|axis| {
             let range = longest(&axis.values, &cuts);
             let left_out = axis.values.len() - range.len();
-            let whole = if left_out > 0 { pieces(&axis.values, &recording.gaps, kind, dt) } else { Vec::new() };
-            let values = axis.values.get(range).unwrap_or_default();
-            let (rate, phase) = match kind {
-                InputKind::Rate => (values.to_vec(), None),
-                InputKind::Increments => (values.iter().map(|v| v / dt).collect(), None),
-                InputKind::Angle => {
-                    (values.windows(2).map(|pair| (pair[1] - pair[0]) / dt).collect(), Some(values.to_vec()))
-                }
-            };
+            let of = |values: &[f64]| rate(values, kind, dt);
+            let whole = if left_out > 0 { pieces(&axis.values, &recording.gaps, kind, of) } else { Vec::new() };
+            let values = axis.values.get(range.clone()).unwrap_or_default();
+            let phase = (kind == InputKind::Angle).then(|| values.to_vec());
             let unit = if kind == InputKind::Rate { axis.unit.clone() } else { axis.unit.times_time(-2) };
-            Stretch { name: axis.name.clone(), unit, rate, phase, left_out, whole }
+            Stretch { name: axis.name.clone(), unit, rate: of(values), phase, left_out, range, whole }
         })
         .collect()
 }
 
-/// The log between its gaps, as rate. A difference of angles over a gap is lost.
-fn pieces(values: &[f64], gaps: &[Gap], kind: InputKind, dt: f64) -> Vec<(u64, Vec<f64>)> {
+/// Increments and angles as rate.
+fn rate(values: &[f64], kind: InputKind, dt: f64) -> Vec<f64> {
+    match kind {
+        InputKind::Rate => values.to_vec(),
+        InputKind::Increments => values.iter().map(|v| v / dt).collect(),
+        InputKind::Angle => values.windows(2).map(|pair| (pair[1] - pair[0]) / dt).collect(),
+    }
+}
+
+/// What was beside the values from which a rate is made: a difference of angles has the mean of two.
+fn beside(values: &[f64], kind: InputKind) -> Vec<f64> {
+    match kind {
+        InputKind::Rate | InputKind::Increments => values.to_vec(),
+        InputKind::Angle => values.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect(),
+    }
+}
+
+/// The log between its gaps, as `of` makes it. A difference of angles over a gap is lost.
+fn pieces(values: &[f64], gaps: &[Gap], kind: InputKind, of: impl Fn(&[f64]) -> Vec<f64>) -> Vec<(u64, Vec<f64>)> {
     let starts = std::iter::once((0, 0)).chain(gaps.iter().map(|gap| (gap.index, gap.missing)));
     let ends = gaps.iter().map(|gap| gap.index).chain([values.len()]);
     let lost = u64::from(kind == InputKind::Angle);
     let pieces = starts.zip(ends).filter(|((start, _), end)| start < end).map(|((start, missing), end)| {
         let own = &values[start..end];
         let missing = if missing > 0 { missing + lost } else { 0 };
-        match kind {
-            InputKind::Rate => (missing, own.to_vec()),
-            InputKind::Increments => (missing, own.iter().map(|v| v / dt).collect()),
-            InputKind::Angle => (missing, own.windows(2).map(|pair| (pair[1] - pair[0]) / dt).collect()),
-        }
+        (missing, of(own))
     });
     pieces.collect()
 }
@@ -133,11 +153,19 @@ mod tests {
     fn pieces_are_what_lies_between_gaps() {
         let gaps = [Gap { index: 2, missing: 7 }, Gap { index: 3, missing: 1 }];
         let values = [1.0, 3.0, 4.0, 8.0, 9.0];
-        let of = |kind| pieces(&values, &gaps, kind, 0.5);
+        let of = |kind| pieces(&values, &gaps, kind, |own| rate(own, kind, 0.5));
         assert_eq!(of(InputKind::Rate), [(0, vec![1.0, 3.0]), (7, vec![4.0]), (1, vec![8.0, 9.0])]);
         assert_eq!(of(InputKind::Increments), [(0, vec![2.0, 6.0]), (7, vec![8.0]), (1, vec![16.0, 18.0])]);
         assert_eq!(of(InputKind::Angle), [(0, vec![4.0]), (8, vec![]), (2, vec![2.0])]);
-        assert_eq!(pieces(&values, &[Gap { index: 0, missing: 3 }], InputKind::Rate, 0.5), [(3, values.to_vec())]);
+        assert_eq!(
+            pieces(&values, &[Gap { index: 0, missing: 3 }], InputKind::Rate, <[f64]>::to_vec),
+            [(3, values.to_vec())]
+        );
+        let kind = InputKind::Angle;
+        assert_eq!(
+            pieces(&values, &gaps, kind, |own| beside(own, kind)),
+            [(0, vec![2.0]), (8, vec![]), (2, vec![8.5])]
+        );
     }
 
     #[test]

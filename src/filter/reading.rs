@@ -81,6 +81,7 @@ fn axis(place: &Place<'_>, quantity: Quantity, plant: &str, dt: f64) -> Result<A
             name: name.clone(),
             bias: None,
             turn_on_bias: None,
+            temperature: None,
             terms: Vec::new(),
             not_identified: Vec::new(),
         },

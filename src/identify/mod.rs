@@ -10,7 +10,7 @@ mod selection;
 mod shape;
 mod weighted_fit;
 
-pub use likelihood::plan;
+pub use likelihood::{Fitted, plan, temperature};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -105,6 +105,8 @@ pub struct Identified {
     pub precision: Vec<Precision>,
     /// Diffuse ln L of the samples (SI) at these parameters, by a Kalman filter; `None` where it would take too long.
     pub exact_log_likelihood: Option<f64>,
+    /// Likelihood only: the model as it was fitted, to see what of it follows the temperature.
+    pub fitted: Option<Fitted>,
     /// Likelihood only, with one Gauss-Markov process: to compare the axes.
     pub time_profile: Option<TimeProfile>,
     pub not_identified: Vec<NotIdentified>,

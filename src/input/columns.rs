@@ -1,17 +1,19 @@
 //! The columns to read: axes, their units, and the time. What stays ambiguous is an error that lists what is there.
 
 use super::names::{Head, axis_at, is_excluded, sensor_of, time_rank, words};
+use super::temperature::Temperature;
 use crate::units::{Dimension, Quantity, Unit};
 
 use super::{AxisInfo, InputError, InputKind, LogOptions};
 
-/// What to read: the time column and its unit, the axes, what they measure.
+/// What to read: the time column and its unit, the axes, what they measure, the temperature beside them.
 #[derive(Clone, Debug)]
 pub(super) struct Choice {
     pub(super) time: Option<(usize, Unit)>,
     pub(super) columns: Vec<usize>,
     pub(super) axes: Vec<AxisInfo>,
     pub(super) quantity: Quantity,
+    pub(super) temperature: Temperature,
 }
 
 /// The columns of a log.
@@ -50,10 +52,11 @@ impl Table<'_> {
         {
             return self.fail(format!("column '{}' is taken both as time and as an axis", self.heads[*time].full));
         }
-        Ok(Choice { time, columns, axes, quantity })
+        let temperature = self.temperature(&options.temperature, &columns, time.as_ref().map(|(c, _)| *c), quantity)?;
+        Ok(Choice { time, columns, axes, quantity, temperature })
     }
 
-    fn fail<T>(&self, what: impl std::fmt::Display) -> Result<T, InputError> {
+    pub(super) fn fail<T>(&self, what: impl std::fmt::Display) -> Result<T, InputError> {
         Err(InputError { message: format!("{}: {what}", self.place) })
     }
 
@@ -134,7 +137,8 @@ impl Table<'_> {
             let mut stem = words(&head.name);
             let by_unit = head.unit.as_ref().and_then(|u| quantity_of(u, options.kind));
             let sensor = sensor_of(&stem);
-            let excluded = is_excluded(&stem);
+            let warm = head.unit.as_ref().is_some_and(|unit| unit.dimension() == Dimension::TEMPERATURE);
+            let excluded = warm || is_excluded(&stem);
             let Some(quantity) = sensor.or(by_unit).filter(|_| !excluded) else { continue };
             let axis = axis_at(&stem);
             if let Some(at) = axis {
@@ -226,7 +230,7 @@ impl Table<'_> {
     fn time(&self, options: &LogOptions) -> Result<Option<(usize, Unit)>, InputError> {
         let (column, flag) = match options.time.as_deref().map(str::trim) {
             Some("none") => return self.no_time(options),
-            Some(text) => self.time_flag(text)?,
+            Some(text) => self.with_unit(text, Dimension::TIME)?,
             None => match self.time_by_name(options)? {
                 Some(column) => (column, None),
                 None => return self.no_time(options),
@@ -263,13 +267,13 @@ impl Table<'_> {
     }
 
     /// `NAME`, `NAME:ms`, `3`, `3:ms`.
-    fn time_flag(&self, text: &str) -> Result<(usize, Option<Unit>), InputError> {
+    pub(super) fn with_unit(&self, text: &str, of: Dimension) -> Result<(usize, Option<Unit>), InputError> {
         let whole = match self.find(text) {
             Ok(column) => return Ok((column, None)),
             Err(error) => error,
         };
         match text.rsplit_once(':').map(|(name, unit)| (name, Unit::parse(unit))) {
-            Some((name, Ok(unit))) if unit.dimension() == Dimension::TIME => Ok((self.find(name)?, Some(unit))),
+            Some((name, Ok(unit))) if unit.dimension() == of => Ok((self.find(name)?, Some(unit))),
             _ => Err(whole),
         }
     }
@@ -308,6 +312,6 @@ impl Table<'_> {
 }
 
 /// The same factor and dimension, however it is spelled.
-fn same(a: &Unit, b: &Unit) -> bool {
+pub(super) fn same(a: &Unit, b: &Unit) -> bool {
     a.dimension() == b.dimension() && (a.scale() - b.scale()).abs() <= 1e-9 * a.scale().abs()
 }

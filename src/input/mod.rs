@@ -4,6 +4,7 @@ mod columns;
 mod names;
 mod npy;
 mod sniff;
+mod temperature;
 mod text;
 
 use std::io::Read;
@@ -19,6 +20,7 @@ use crate::signal::{Axis, Gap, LogCheck, Recording};
 use crate::units::{Quantity, Unit};
 
 pub use crate::signal::check::InputKind;
+pub use temperature::TemperatureColumn;
 
 /// The flags every command that takes LOG has.
 #[derive(Clone, Debug, Default)]
@@ -38,6 +40,8 @@ pub struct LogOptions {
     pub kind: InputKind,
     /// Prefer this quantity when the log holds both (default angular rate).
     pub quantity: Option<Quantity>,
+    /// Only [`read`] takes it.
+    pub temperature: TemperatureColumn,
 }
 
 /// One line: file, line or column, found, expected, what to do.
@@ -95,7 +99,8 @@ trait Table {
     /// File and place of the names, for messages.
     fn place(&self) -> String;
     fn row_place(&self, line: u64) -> String;
-    fn select(&mut self, time: Option<usize>, axes: &[usize]);
+    /// `beside`: a column behind the axes, in which text is a missing value.
+    fn select(&mut self, time: Option<usize>, axes: &[usize], beside: Option<usize>);
     fn rewind(&mut self) -> Result<(), InputError>;
     /// Number of rows, where the file says it.
     fn rows(&self) -> Option<u64>;
@@ -188,7 +193,8 @@ impl Log {
         let mut table = open_table(path)?;
         let (named, place) = (table.named(), table.place());
         let choice = columns::Table { heads: &table.heads(), named, place: &place }.choose(options)?;
-        table.select(choice.time.as_ref().map(|(column, _)| *column), &choice.columns);
+        let beside = choice.temperature.column.as_ref().map(|(column, _)| *column);
+        table.select(choice.time.as_ref().map(|(column, _)| *column), &choice.columns, beside);
         Ok(Log { table, choice, options: options.clone() })
     }
 
@@ -220,8 +226,9 @@ impl Log {
                 });
             }
         }
-        for (column, axis) in rows.values.iter_mut().zip(&self.choice.axes) {
-            column.iter_mut().for_each(|x| *x = axis.unit.to_si(*x));
+        let beside = self.choice.temperature.column.as_ref().map(|(_, info)| info);
+        for (column, info) in rows.values.iter_mut().zip(self.choice.axes.iter().chain(beside)) {
+            column.iter_mut().for_each(|x| *x = info.unit.to_si(*x));
         }
         let stamped = self.stamped();
         let rate = self.options.rate_hz.unwrap_or(f64::NAN);
@@ -391,19 +398,26 @@ impl LogReader {
 /// The whole log in memory with its check.
 pub fn read(path: &Path, options: &LogOptions) -> Result<(Recording, LogCheck), InputError> {
     let mut log = Log::open(path, options)?;
-    let mut values: Vec<Vec<f64>> = vec![Vec::new(); log.choice.axes.len()];
+    let beside = usize::from(log.choice.temperature.column.is_some());
+    let mut values: Vec<Vec<f64>> = vec![Vec::new(); log.choice.axes.len() + beside];
     if let (Some(rows), None, None) = (log.table.rows(), options.start_s, options.end_s) {
         values.iter_mut().for_each(|column| column.reserve_exact(rows as usize)); // the file is as long as it says
     }
-    let scan = log.scan(|rows, wanted| {
+    let mut scan = log.scan(|rows, wanted| {
         for (kept, column) in values.iter_mut().zip(&rows.values) {
             kept.extend_from_slice(&column[wanted.clone()]);
         }
     })?;
-    let axes = log.choice.axes.into_iter().zip(values).map(|(info, mut values)| {
+    let axis = |(info, mut values): (AxisInfo, Vec<f64>)| {
         values.shrink_to_fit();
         Axis { name: info.name, unit: info.unit, values }
-    });
+    };
+    let beside = values.split_off(log.choice.axes.len()).pop();
+    let (temperature, note) = temperature::usable(log.choice.temperature.clone(), beside, options)
+        .or_else(|what| log.fail(what))
+        .map(|(found, note)| (found.map(axis), note))?;
+    scan.check.findings.extend(note);
+    let axes = log.choice.axes.into_iter().zip(values).map(axis);
     let recording = Recording {
         name: path.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned()),
         quantity: log.choice.quantity,
@@ -411,6 +425,7 @@ pub fn read(path: &Path, options: &LogOptions) -> Result<(Recording, LogCheck), 
         start_s: scan.start_s,
         axes: axes.collect(),
         gaps: scan.gaps,
+        temperature,
         sha256: Some(sha256(path)?),
     };
     Ok((recording, scan.check))

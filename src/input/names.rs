@@ -112,9 +112,21 @@ const PAIRS: [(&str, &str, Quantity); 7] = [
     ("turn", "rate", Quantity::AngularRate),
     ("specific", "force", Quantity::SpecificForce),
 ];
+const TEMPERATURE_WORDS: [&str; 6] = ["temp", "temperature", "temperatures", "tempc", "tempf", "tempk"];
+/// Behind the name of a temperature column, or in brackets.
+const TEMPERATURE_UNITS: [(&str, &str); 8] = [
+    ("celsius", "degC"),
+    ("degc", "degC"),
+    ("c", "degC"),
+    ("kelvin", "K"),
+    ("k", "K"),
+    ("fahrenheit", "degF"),
+    ("degf", "degF"),
+    ("f", "degF"),
+];
 const AXIS_WORDS: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];
 /// Columns that are about a sensor but are not its output.
-const NOT_A_SENSOR: [&str; 22] = [
+const NOT_A_SENSOR: [&str; 20] = [
     "truth",
     "true",
     "bias",
@@ -132,8 +144,6 @@ const NOT_A_SENSOR: [&str; 22] = [
     "quat",
     "quaternion",
     "euler",
-    "temp",
-    "temperature",
     "est",
     "estimate",
     "innovation",
@@ -174,7 +184,9 @@ impl Head {
 
     fn set_unit(&mut self, name: &str, unit: &str) {
         self.name = name.trim().trim_end_matches('/').trim_end().to_string();
-        self.unit = Unit::parse(unit).ok();
+        // C and F are no units by themselves, but a temperature has no others
+        let of_temperature = || temperature_unit(unit).filter(|_| is_temperature(&words(&self.name)));
+        self.unit = Unit::parse(of_temperature().unwrap_or(unit)).ok();
         self.unit_text = Some(unit.trim().to_string());
     }
 }
@@ -231,6 +243,13 @@ fn suffixed(text: &str) -> Option<(&str, &'static str)> {
     };
     if let Some(found) = table.iter().find_map(|(suffix, unit)| cut(suffix).map(|name| (name, *unit))) {
         return Some(found);
+    }
+    let all = words(text);
+    if is_temperature(&all)
+        && let Some(unit) = all.last().and_then(|word| TEMPERATURE_UNITS.iter().find(|(suffix, _)| word == suffix))
+    {
+        let name = text.get(..text.len().checked_sub(unit.0.len())?)?;
+        return Some((name.trim_end_matches(['_', ' ', '.', '-']), unit.1));
     }
     for (suffix, unit) in TIME_SUFFIXES {
         if lower == suffix && suffix.len() > 2 {
@@ -300,9 +319,31 @@ pub(super) fn axis_at(words: &[String]) -> Option<usize> {
         .or_else(|| words.len().checked_sub(1).filter(|&i| i > 0 && digit(&words[i])))
 }
 
-/// True for a column about a sensor that is not its output: truth, bias, standard deviation, magnetometer …
+/// True for a column about a sensor that is not its output: truth, bias, standard deviation, magnetometer, temperature …
 pub(super) fn is_excluded(words: &[String]) -> bool {
-    words.iter().any(|w| NOT_A_SENSOR.contains(&w.as_str()))
+    is_temperature(words) || words.iter().any(|w| NOT_A_SENSOR.contains(&w.as_str()))
+}
+
+/// The words are about a temperature.
+pub(super) fn is_temperature(words: &[String]) -> bool {
+    words.iter().any(|w| TEMPERATURE_WORDS.contains(&w.as_str()))
+}
+
+/// `C`, `°C`, `deg C` and their kin.
+fn temperature_unit(text: &str) -> Option<&'static str> {
+    let sign = |c: &char| c.is_whitespace() || matches!(c, '°' | 'º' | '˚');
+    let letters: String = text.chars().filter(|c| !sign(c)).flat_map(char::to_lowercase).collect();
+    let bare = letters.strip_prefix("deg").unwrap_or(&letters);
+    TEMPERATURE_UNITS.iter().find(|(name, _)| *name == bare).map(|(_, unit)| *unit)
+}
+
+/// A word for the sensor of this quantity is among them.
+pub(super) fn is_of(words: &[String], quantity: Quantity) -> bool {
+    let list: &[&str] = match quantity {
+        Quantity::AngularRate => &GYRO_WORDS,
+        Quantity::SpecificForce => &FORCE_WORDS,
+    };
+    words.iter().any(|w| list.contains(&w.as_str()))
 }
 
 /// Gyro or accelerometer, if the words say so.

@@ -37,6 +37,7 @@ pub(super) struct NpyTable {
     rows: u64,
     next: u64,
     time: Option<usize>,
+    /// The axes and what is beside them.
     axes: Vec<usize>,
     /// First stamp, whole and fraction.
     origin: Option<(i128, f64)>,
@@ -112,9 +113,9 @@ impl Table for NpyTable {
     fn rows(&self) -> Option<u64> {
         Some(self.rows)
     }
-    fn select(&mut self, time: Option<usize>, axes: &[usize]) {
+    fn select(&mut self, time: Option<usize>, axes: &[usize], beside: Option<usize>) {
         self.time = time;
-        self.axes = axes.to_vec();
+        self.axes = axes.iter().copied().chain(beside).collect();
     }
     fn rewind(&mut self) -> Result<(), InputError> {
         self.next = 0;

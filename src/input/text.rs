@@ -22,6 +22,8 @@ enum Slot {
     Skip,
     Time,
     Axis(usize),
+    /// The same, but text is a missing value.
+    Beside(usize),
 }
 
 pub(super) struct TextTable {
@@ -120,6 +122,10 @@ impl TextTable {
                     }
                     None => false,
                 },
+                Some(Slot::Beside(place)) => {
+                    rows.values[*place].push(sniff::number(field, comma).unwrap_or(f64::NAN));
+                    true
+                }
                 Some(Slot::Time) => match stamp(field, comma) {
                     Some((whole, fraction)) => {
                         let origin = match self.origin {
@@ -174,10 +180,13 @@ impl Table for TextTable {
     fn row_place(&self, line: u64) -> String {
         format!("{}: line {line}", self.path.display())
     }
-    fn select(&mut self, time: Option<usize>, axes: &[usize]) {
+    fn select(&mut self, time: Option<usize>, axes: &[usize], beside: Option<usize>) {
         self.slots.fill(Slot::Skip);
         for (axis, &column) in axes.iter().enumerate() {
             self.slots[column] = Slot::Axis(axis);
+        }
+        if let Some(column) = beside {
+            self.slots[column] = Slot::Beside(axes.len());
         }
         if let Some(column) = time {
             self.slots[column] = Slot::Time;
@@ -192,7 +201,7 @@ impl Table for TextTable {
         self.origin.map_or(0.0, |(whole, fraction)| whole as f64 + fraction)
     }
     fn next_rows(&mut self, rows: &mut Rows) -> Result<bool, InputError> {
-        rows.clear(self.slots.iter().filter(|s| matches!(s, Slot::Axis(_))).count());
+        rows.clear(self.slots.iter().filter(|s| matches!(s, Slot::Axis(_) | Slot::Beside(_))).count());
         while rows.lines.len() < BLOCK && self.next_line()? {
             if self.line_number == 1 && self.line.starts_with(BYTE_ORDER_MARK) {
                 self.line.drain(..BYTE_ORDER_MARK.len());

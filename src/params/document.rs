@@ -7,7 +7,7 @@ use serde::{Serialize, Serializer};
 
 use super::measured::Range;
 use super::place::{KeyError, Object, Place};
-use super::{AxisParams, Design, Measured, NotIdentified, Params, Source, TermEntry};
+use super::{AxisParams, Design, Measured, NotIdentified, Params, Source, TemperatureEffect, TermEntry};
 use crate::units::{Dimension, Quantity, Unit};
 
 pub(super) const FORMAT: &str = "kfdesign-params/1";
@@ -63,6 +63,9 @@ struct AxisDocument {
     /// Spread of the bias from one power-up to the next.
     #[serde(skip_serializing_if = "Option::is_none")]
     turn_on_bias: Option<StdDev>,
+    /// How the bias followed the temperature of the log. The noise terms are those of the log as it is: this changes none of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    temperature: Option<TemperatureDocument>,
     #[serde(skip_serializing_if = "Option::is_none")]
     quantization: Option<OneOrMany<Coefficient>>,
     /// Root of the two-sided power spectral density.
@@ -86,6 +89,19 @@ struct AxisDocument {
     /// What the log cannot tell.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     not_identified: Vec<NotIdentifiedDocument>,
+}
+
+/// bias + coefficient · (temperature − reference).
+#[derive(Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "Temperature")]
+struct TemperatureDocument {
+    /// Change of the bias with temperature, for example "0.01 deg/s/degC".
+    coefficient: Measured,
+    /// Mean temperature of the log, to which its bias belongs.
+    reference: Measured,
+    /// Highest less lowest temperature of the log.
+    span: Measured,
 }
 
 #[derive(Serialize, JsonSchema)]
@@ -221,6 +237,9 @@ impl From<&AxisParams> for AxisDocument {
             name: axis.name.clone(),
             bias: axis.bias.clone(),
             turn_on_bias: axis.turn_on_bias.clone().map(|std_dev| StdDev { std_dev }),
+            temperature: axis.temperature.clone().map(|TemperatureEffect { coefficient, reference, span }| {
+                TemperatureDocument { coefficient, reference, span }
+            }),
             quantization: one_or_many(quantization),
             white: one_or_many(white),
             moving_average: one_or_many(moving_average),
@@ -318,7 +337,7 @@ pub(crate) fn quantity(place: &Place<'_>) -> Result<Quantity, KeyError> {
 }
 
 pub(super) fn axis(place: &Place<'_>, quantity: Quantity) -> Result<AxisParams, KeyError> {
-    let mut known = vec!["name", "bias", "turn_on_bias"];
+    let mut known = vec!["name", "bias", "turn_on_bias", "temperature"];
     known.extend(TERM_KEYS);
     known.push("not_identified");
     let object = place.object(&known)?;
@@ -345,8 +364,19 @@ pub(super) fn axis(place: &Place<'_>, quantity: Quantity) -> Result<AxisParams, 
         name: text.to_string(),
         bias: object.optional("bias").map(|p| Measured::from_place(&p, base, Range::Any)).transpose()?,
         turn_on_bias,
+        temperature: object.optional("temperature").map(|p| temperature(&p, base)).transpose()?,
         terms,
         not_identified,
+    })
+}
+
+fn temperature(place: &Place<'_>, base: Dimension) -> Result<TemperatureEffect, KeyError> {
+    let object = place.object(&["coefficient", "reference", "span"])?;
+    let of = |key: &str, dimension| Measured::from_place(&object.required(key)?, dimension, Range::Any);
+    Ok(TemperatureEffect {
+        coefficient: of("coefficient", base.per_temperature())?,
+        reference: of("reference", Dimension::TEMPERATURE)?,
+        span: positive(&object, "span", Dimension::TEMPERATURE)?,
     })
 }
 

@@ -46,6 +46,17 @@ pub struct NotIdentified {
     pub needed_log_s: Option<f64>,
 }
 
+/// Bias = bias + coefficient · (temperature − reference).
+#[derive(Clone, Debug, PartialEq)]
+pub struct TemperatureEffect {
+    /// Change of the bias with temperature.
+    pub coefficient: Measured,
+    /// Mean temperature of the log, to which its bias belongs: a reading, of which the unit gives no SI value.
+    pub reference: Measured,
+    /// Highest less lowest temperature of the log.
+    pub span: Measured,
+}
+
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisParams {
     pub name: String,
@@ -53,6 +64,8 @@ pub struct AxisParams {
     pub bias: Option<Measured>,
     /// Standard deviation of the bias from one power-up to the next; feeds P0.
     pub turn_on_bias: Option<Measured>,
+    /// How the bias followed the temperature of the log; the noise terms do not know of it.
+    pub temperature: Option<TemperatureEffect>,
     pub terms: Vec<TermEntry>,
     pub not_identified: Vec<NotIdentified>,
 }

@@ -40,7 +40,7 @@ pub enum TimeBase {
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Finding {
     /// Short code: "jitter", "gap", "repeated-stamp", "backward-stamp", "rate", "zero-row", "repeated-row", "nan", "stuck",
-    /// "saturated", "quantised", "outlier", "motion".
+    /// "saturated", "quantised", "outlier", "motion", "temperature".
     pub kind: String,
     pub axis: Option<String>,
     pub count: u64,

@@ -4,6 +4,7 @@ pub mod check;
 pub mod correlation;
 pub mod cosine;
 pub mod lines;
+pub mod smoothing;
 pub mod spectrum;
 pub mod upsets;
 
@@ -39,6 +40,9 @@ pub struct Recording {
     pub axes: Vec<Axis>,
     /// Ascending by index; found from the time column by a stated rule, never repaired.
     pub gaps: Vec<Gap>,
+    /// As long as the axes, if the log has it and it was asked for: readings times the factor of their unit (degC counts from 0 degC), of which only
+    /// differences are used. NaN where it is missing.
+    pub temperature: Option<Axis>,
     /// Hex SHA-256 of the file's bytes (as stored), if it came from a file.
     pub sha256: Option<String>,
 }

@@ -29,10 +29,16 @@ impl Dimension {
     pub const NONE: Dimension = Dimension::new(0, 0, 0);
     pub const TIME: Dimension = Dimension::new(0, 0, 2);
     pub const FREQUENCY: Dimension = Dimension::new(0, 0, -2);
+    pub const TEMPERATURE: Dimension = Dimension { temperature: 2, ..Dimension::NONE };
 
     /// Doubled exponents of angle, length, time.
     pub const fn new(angle: i8, length: i8, time: i8) -> Self {
         Dimension { angle, length, time, temperature: 0 }
+    }
+
+    /// The change of this dimension with temperature.
+    pub const fn per_temperature(self) -> Self {
+        Dimension { temperature: self.temperature - 2, ..self }
     }
 
     /// The same dimension times `time^(half_powers/2)`.
@@ -45,14 +51,23 @@ impl Dimension {
         if let Some(named) = self.named() {
             return named.3.to_string();
         }
-        if self == (Dimension { temperature: 2, ..Dimension::NONE }) {
+        if self == Dimension::TEMPERATURE {
             return "a temperature".into();
+        }
+        if self.temperature == -2 {
+            return format!("{} per temperature", Dimension { temperature: 0, ..self }.name());
         }
         format!("a {}", self.powers(["angle", "length", "time", "temperature"]))
     }
 
     /// A unit of this dimension.
     pub fn example(self) -> String {
+        if self == Dimension::TEMPERATURE {
+            return "degC".into();
+        }
+        if self.temperature == -2 {
+            return format!("{}/degC", Dimension { temperature: 0, ..self }.example());
+        }
         self.named().map_or_else(|| self.powers(["rad", "m", "s", "K"]), |named| named.4.to_string())
     }
 

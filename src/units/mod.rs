@@ -25,7 +25,7 @@ pub struct Dimension {
 
 /// A parsed unit: the text as the user wrote it, its factor to SI and its dimension.
 ///
-/// A unit is a factor only. Temperatures in degC and K therefore agree as differences, not as readings.
+/// A unit is a factor only. Temperatures in degC, degF and K therefore agree as differences, not as readings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Unit {
     text: String,
@@ -93,6 +93,14 @@ impl Unit {
     pub fn one() -> Unit {
         Unit::of_factors(Vec::new())
     }
+    /// `s`.
+    pub fn second() -> Unit {
+        Unit::of_factors(vec![Factor { symbol: Symbol::second(), half_power: 2 }])
+    }
+    /// `Hz`.
+    pub fn hertz() -> Unit {
+        Unit::of_factors(vec![Factor { symbol: Symbol::hertz(), half_power: 2 }])
+    }
     pub fn text(&self) -> &str {
         &self.text
     }
@@ -142,6 +150,11 @@ impl Unit {
             _ => {}
         }
         Unit::of_factors(factors)
+    }
+    /// This unit divided by another, without leading numbers: `deg/s` per `degC` is `deg/s/degC`.
+    pub fn per(&self, other: &Unit) -> Unit {
+        let below = other.factors.iter().map(|f| Factor { half_power: -f.half_power, symbol: f.symbol.clone() });
+        Unit::of_factors(self.factors.iter().cloned().chain(below).collect())
     }
     /// The quantity this unit belongs to, if it is a rate or a specific force.
     pub fn quantity(&self) -> Option<Quantity> {

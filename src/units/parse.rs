@@ -288,13 +288,13 @@ fn tokens(text: &str) -> Result<Vec<Token>, Problem> {
 }
 
 fn is_letter(c: char) -> bool {
-    c.is_alphabetic() || matches!(c, '°' | '˚' | '′' | '″' | '℃')
+    c.is_alphabetic() || matches!(c, '°' | '˚' | '′' | '″' | '℃' | '℉')
 }
 
-/// `°` and its kin are names of one letter, except in `°C`.
+/// `°` and its kin are names of one letter, except in `°C` and `°F`.
 fn name_length(letters: &[char]) -> usize {
     match letters {
-        ['°' | 'º' | '˚', 'C', rest @ ..] if !rest.first().is_some_and(|c| c.is_alphabetic()) => 2,
+        ['°' | 'º' | '˚', 'C' | 'F', rest @ ..] if !rest.first().is_some_and(|c| c.is_alphabetic()) => 2,
         ['°' | 'º' | '˚' | '′' | '″', ..] => 1,
         _ => letters.iter().take_while(|c| c.is_alphabetic() && !matches!(**c, 'º' | 'ª')).count().max(1),
     }
@@ -304,6 +304,7 @@ fn name_length(letters: &[char]) -> usize {
 fn push_name(tokens: &mut Vec<Token>, name: String) -> bool {
     let plain = match name.as_str() {
         "°C" | "ºC" | "˚C" => "degC",
+        "°F" | "ºF" | "˚F" => "degF",
         other => other,
     };
     if plain == "per" {

@@ -16,7 +16,7 @@ const ANGLE: Dimension = Dimension::new(2, 0, 0);
 const RATE: Dimension = Dimension::new(2, 0, -2);
 const LENGTH: Dimension = Dimension::new(0, 2, 0);
 const FORCE: Dimension = Dimension::new(0, 2, -4);
-const TEMPERATURE: Dimension = Dimension { temperature: 2, ..Dimension::NONE };
+const TEMPERATURE: Dimension = Dimension::TEMPERATURE;
 
 const DEGREE: f64 = PI / 180.0;
 /// m/s², by definition (CGPM 1901).
@@ -45,6 +45,7 @@ const TABLE: &[Row] = &[
     ("Hz", 1.0, Dimension::FREQUENCY, "mkMG", &[], &["hz", "hertz"]),
     ("K", 1.0, TEMPERATURE, "m", &[], &["kelvin"]),
     ("degC", 1.0, TEMPERATURE, "", &["℃"], &["degc", "celsius"]),
+    ("degF", 5.0 / 9.0, TEMPERATURE, "", &["℉"], &["degf", "fahrenheit"]),
 ];
 
 impl Symbol {
@@ -98,7 +99,7 @@ pub(super) fn hint(name: &str) -> String {
         "o" | "O" => "a degree is written deg",
         "H" => "an hour is written h",
         "S" => "a second is written s",
-        "C" => "a temperature is written degC or K",
+        "C" | "F" => "a temperature is written degC, degF or K",
         "r" | "R" => "revolution or radian? write rev or rad",
         "M" => "metre or minute? write m or min",
         "gon" | "grad" | "Grad" => "an angle is written deg or rad",

@@ -14,6 +14,7 @@ fn axis(name: &str, model: LinearModel) -> AxisDesign {
         name: name.into(),
         bias: None,
         turn_on_bias: Some(unit("deg/s", 0.5)),
+        temperature: None,
         terms: vec![
             TermEntry::White { density: unit("deg/s/sqrt(Hz)", 0.0562) },
             TermEntry::GaussMarkov { std_dev: unit("deg/s", 0.03), correlation_time: unit("s", 193.9312) },

@@ -56,6 +56,12 @@ fn section(axis: &Axis, params: &Params) -> Section {
             .paragraph("What this log does not tell:")
             .list(found.not_identified.iter().map(not_identified).collect());
     }
+    if let Some(warmth) = &axis.warmth {
+        section = warmth.sentences().into_iter().fold(section, Section::paragraph);
+        if let Some(pairs) = warmth.table() {
+            section = section.table(pairs.caption, pairs.header, pairs.rows);
+        }
+    }
     if let Some(candidates) = tables::candidates(&found.candidates) {
         section = section.table(candidates.caption, candidates.header, candidates.rows);
     }

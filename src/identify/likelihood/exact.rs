@@ -51,16 +51,7 @@ impl<'a> Exact<'a> {
     }
 
     fn model(&self, logs: &[f64]) -> Option<LinearModel> {
-        let terms = self.form.split(logs).filter_map(|(piece, own)| {
-            let values: Vec<f64> = own.iter().map(|v| v.exp()).collect();
-            piece.term(&values)
-        });
-        let noise = NoiseModel { terms: terms.collect() };
-        // a model needs a state: for white noise alone one that is zero
-        let zero = Some(InitialBias { mean: 0.0, std_dev: 0.0 });
-        // the quantity names units, no numbers
-        let with = |bias| sensor_errors(Quantity::AngularRate, &noise, bias, self.data.dt, self.data.span_s());
-        with(None).or_else(|_| with(zero)).ok()
+        model(self.form, logs, self.data.dt, self.data.span_s())
     }
 
     fn each(&self, logs: &[f64]) -> Option<Vec<LogLikelihood>> {
@@ -146,6 +137,20 @@ impl<'a> Exact<'a> {
         }
         information
     }
+}
+
+/// The filter model of a form at these logarithms; `span_s`: length of the log.
+pub(super) fn model(form: &Form, logs: &[f64], dt: f64, span_s: f64) -> Option<LinearModel> {
+    let terms = form.split(logs).filter_map(|(piece, own)| {
+        let values: Vec<f64> = own.iter().map(|v| v.exp()).collect();
+        piece.term(&values)
+    });
+    let noise = NoiseModel { terms: terms.collect() };
+    // a model needs a state: for white noise alone one that is zero
+    let zero = Some(InitialBias { mean: 0.0, std_dev: 0.0 });
+    // the quantity names units, no numbers
+    let with = |bias| sensor_errors(Quantity::AngularRate, &noise, bias, dt, span_s);
+    with(None).or_else(|_| with(zero)).ok()
 }
 
 fn moved(at: &[f64], shifts: &[(usize, f64)]) -> Vec<f64> {

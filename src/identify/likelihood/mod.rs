@@ -1,7 +1,7 @@
 //! Maximum likelihood on the cosine coefficients of the log: terms chosen, intervals given, the Cramér-Rao bound beside them.
 //!
 //! `ordinates` is the log in bins, `form` what a model consists of, `whittle` the likelihood and its maximum, `growth` the choice of the
-//! terms, `interval` what is known of each parameter, `plan` how long a log must be for that.
+//! terms, `interval` what is known of each parameter, `plan` how long a log must be for that, `temperature` what of it follows the temperature.
 
 mod exact;
 mod form;
@@ -10,6 +10,7 @@ mod interval;
 mod ordinates;
 pub mod plan;
 pub(super) mod shared;
+pub mod temperature;
 mod turn_on;
 mod whittle;
 
@@ -92,12 +93,8 @@ pub(super) fn identify(
         }));
     };
 
-    let refined = Exact::new(&data, on_cosines, logs).and_then(|exact| exact.refine(on_cosines));
-    let fit =
-        &refined.as_ref().map_or_else(|| on_cosines.clone(), |r| Fit { logs: r.logs.clone(), ..on_cosines.clone() });
-    let known =
-        &refined.as_ref().map_or_else(|| known.clone(), |refined| moved(on_cosines, known, refined, &data, logs));
-
+    let (fitted, refined) = refine(&data, on_cosines, known, on_cosines, logs);
+    let Fitted { fit, known } = &fitted;
     let words = Words { data: &data, display };
     let terms = known_terms(&data, fit, known);
     let all_known = terms.len() == fit.form.pieces().len();
@@ -135,11 +132,13 @@ pub(super) fn identify(
             name: name.into(),
             bias: Some(bias),
             turn_on_bias,
+            temperature: None,
             terms: terms.iter().map(|found| entry(&found.term, &found.intervals, display)).collect::<Result<_, _>>()?,
             not_identified: not_identified.clone(),
         },
         precision: known_precision(&terms),
         time_profile: shared::TimeProfile::new(&data, on_cosines),
+        fitted: Some(fitted.clone()),
         // of the parameters that are written, not of others
         exact_log_likelihood: refined.filter(|_| all_known).map(|refined| refined.log_likelihood),
         warnings: words.warnings(fit, fit_p_value),
@@ -151,6 +150,32 @@ pub(super) fn identify(
         first_tau_s: None,
         curve,
     })
+}
+
+/// A model at its best parameters, drift that is not identified included.
+#[derive(Clone, Debug)]
+pub struct Fitted {
+    fit: Fit,
+    known: Vec<Precision>,
+}
+
+/// From the maximum on the cosine coefficients to that of the exact likelihood of all logs, where it can be had; searched from `start`.
+fn refine(
+    data: &Ordinates,
+    on_cosines: &Fit,
+    known: &[Precision],
+    start: &Fit,
+    logs: &[Vec<Stretch<'_>>],
+) -> (Fitted, Option<Refined>) {
+    let refined = Exact::new(data, start, logs).and_then(|exact| exact.refine(start));
+    let fitted = match &refined {
+        Some(refined) => Fitted {
+            fit: Fit { logs: refined.logs.clone(), ..on_cosines.clone() },
+            known: moved(on_cosines, known, refined, data, logs),
+        },
+        None => Fitted { fit: on_cosines.clone(), known: known.to_vec() },
+    };
+    (fitted, refined)
 }
 
 /// What is known of each logarithm at the maximum of the exact likelihood: intervals of what is known well move along, and shrink where there was
@@ -297,6 +322,24 @@ fn known_precision(terms: &[Found]) -> Vec<Known> {
     all
 }
 
+/// Of a logarithm: its name in params.json.
+fn name_of(form: &Form, index: usize) -> String {
+    let (piece, role) = form.roles()[index];
+    let kind = form.pieces()[piece].kind();
+    let number = form.pieces()[..piece].iter().filter(|p| p.kind() == kind).count();
+    parameter_name(kind, number, role)
+}
+
+/// Of a logarithm: the unit of its parameter in the family of the log's unit.
+fn unit_of(form: &Form, index: usize, display: &Unit) -> Unit {
+    let (piece, role) = form.roles()[index];
+    match role {
+        Role::CorrelationTime => Unit::second(),
+        Role::Frequency => Unit::hertz(),
+        Role::Coefficient => super::coefficient_unit(form.pieces()[piece].kind(), display),
+    }
+}
+
 /// `gauss_markov[1]`.
 fn term_name(kind: Kind, number: usize) -> String {
     if number == 0 { document_name(kind).to_string() } else { format!("{}[{number}]", document_name(kind)) }
@@ -358,24 +401,10 @@ struct Words<'a> {
 }
 
 impl Words<'_> {
-    fn name(fit: &Fit, index: usize) -> String {
-        let (piece, role) = fit.form.roles()[index];
-        let kind = fit.form.pieces()[piece].kind();
-        let number = fit.form.pieces()[..piece].iter().filter(|p| p.kind() == kind).count();
-        parameter_name(kind, number, role)
-    }
-
     /// A value of one parameter in the unit of the log.
     fn shown(&self, fit: &Fit, index: usize, log: f64) -> String {
-        let (piece, role) = fit.form.roles()[index];
-        match role {
-            Role::CorrelationTime => format!("{} s", digits(log.exp())),
-            Role::Frequency => format!("{} Hz", digits(log.exp())),
-            Role::Coefficient => {
-                let unit = super::coefficient_unit(fit.form.pieces()[piece].kind(), self.display);
-                format!("{} {unit}", digits(unit.from_si(log.exp())))
-            }
-        }
+        let unit = unit_of(&fit.form, index, self.display);
+        format!("{} {unit}", digits(unit.from_si(log.exp())))
     }
 
     fn unknown_parameters(&self, fit: &Fit, known: &[Precision]) -> Vec<NotIdentified> {
@@ -395,7 +424,7 @@ impl Words<'_> {
         // widths shrink like T^(−1/2)
         let needed = self.data.span_s() * (2.0 * NORMAL_95 * known.bound / WIDEST_INTERVAL.ln()).powi(2);
         NotIdentified {
-            term: Words::name(fit, index),
+            term: name_of(&fit.form, index),
             reason: format!("{reason}, model {}", fit.form.label()),
             needed_log_s: (needed.is_finite() && needed > self.data.span_s()).then_some(needed),
         }

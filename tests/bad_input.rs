@@ -2,6 +2,8 @@
 //!
 //! One table per kind of file; a row is what is wrong, the command, and words that the line must contain.
 
+mod temperature;
+
 use super::support::Bench;
 
 /// What is wrong, the file's name and bytes, the command's arguments, words of the message.

@@ -1,7 +1,7 @@
 //! params.json: what is accepted, what is refused and how, the round trip, the schema.
 
 use kfdesign::noise::Term;
-use kfdesign::params::{AxisParams, Measured, NotIdentified, Params, Source, TermEntry};
+use kfdesign::params::{AxisParams, Measured, NotIdentified, Params, Source, TemperatureEffect, TermEntry};
 use kfdesign::units::{Quantity, Unit};
 use serde_json::{Value, json};
 
@@ -75,7 +75,11 @@ fn writing_and_reading_gives_the_same_document() {
                 name: "accel x".into(),
                 bias: Some(measured(-0.1, "mg", Some([-0.3, 0.1]))),
                 turn_on_bias: Some(measured(3.0, "mg", None)),
-                temperature: None,
+                temperature: Some(TemperatureEffect {
+                    coefficient: measured(0.02, "mg/degC", Some([-0.01, 0.05])),
+                    reference: measured(-4.5, "degC", None),
+                    span: measured(1.5, "K", None),
+                }),
                 terms: vec![
                     TermEntry::Quantization { coefficient: measured(1e-6, "m/s", None) },
                     TermEntry::White { density: measured(0.1 + 0.2, "µg/√Hz", Some([0.1, 0.7])) },
@@ -137,6 +141,11 @@ fn each_complaint_names_file_key_and_reason() {
         term[key] = value;
         with("/axes/0/oscillation", json!([term]))
     };
+    let warm = |key: &str, value: Value| {
+        let mut record = json!({"coefficient": "0.02 deg/s/degC", "reference": "25 degC", "span": "3 degC"});
+        record[key] = value;
+        with("/axes/0/temperature", record)
+    };
     let mut twice = document();
     let axis = twice["axes"][0].clone();
     twice["axes"].as_array_mut().unwrap().push(axis);
@@ -161,6 +170,11 @@ fn each_complaint_names_file_key_and_reason() {
         (with("/axes/0/name", json!("")), "axes[0].name: ", "readable"),
         (with("/axes/0/name", json!("a\nb")), "axes[0].name: ", "readable"),
         (without("/axes/0/name"), "axes[0].name: ", "missing"),
+        (warm("coefficient", json!("1 deg/s")), "axes[0].temperature.coefficient: ", "expected an angular rate per temperature (for example deg/s/degC)"),
+        (warm("coefficient", json!(null)), "axes[0].temperature.coefficient: ", "missing"),
+        (warm("reference", json!(20)), "axes[0].temperature.reference: ", "the number 20 has no unit; write \"20 degC\""),
+        (warm("span", json!("0 degC")), "axes[0].temperature.span: ", "greater than zero"),
+        (warm("spam", json!("1 degC")), "axes[0].temperature.spam: ", "did you mean 'span'"),
         (with("/axes/0/whit", json!({})), "axes[0].whit: ", "did you mean 'white'"),
         (with("/axes/0/gauss_markow", json!([])), "axes[0].gauss_markow: ", "did you mean 'gauss_markov'"),
         (with("/axes/0/rrw", json!({})), "axes[0].rrw: ", "known here: name, bias"),

@@ -70,6 +70,7 @@ const SPELLINGS: &[(&str, f64, Dimension)] = &[
     // the rest
     ("s", 1.0, TIME), ("sec", 1.0, TIME), ("ms", 1e-3, TIME), ("us", 1e-6, TIME), ("µs", 1e-6, TIME), ("ns", 1e-9, TIME), ("min", 60.0, TIME), ("h", 3600.0, TIME),
     ("hr", 3600.0, TIME), ("Hz", 1.0, FREQUENCY), ("kHz", 1e3, FREQUENCY), ("1/s", 1.0, FREQUENCY), ("s^-1", 1.0, FREQUENCY), ("1/ms", 1e3, FREQUENCY),
+    ("degF", 5.0 / 9.0, Dimension::TEMPERATURE), ("°F", 5.0 / 9.0, Dimension::TEMPERATURE), ("deg/s/degC", DEG, RATE.per_temperature()),
     ("degC", 1.0, Dimension { angle: 0, length: 0, time: 0, temperature: 2 }), ("°C", 1.0, Dimension { angle: 0, length: 0, time: 0, temperature: 2 }),
     ("K", 1.0, Dimension { angle: 0, length: 0, time: 0, temperature: 2 }), ("1", 1.0, Dimension::NONE),
     ("(deg/s)^2/Hz", DEG * DEG, Dimension::new(4, 0, -2)),
@@ -264,4 +265,24 @@ proptest! {
             let _ = unit.require(Dimension::NONE);
         }
     }
+}
+
+/// A rate per temperature in the spelling of both, without leading numbers, and its words.
+#[test]
+fn a_unit_per_another() {
+    let per = |a: &str, b: &str| Unit::parse(a).unwrap().per(&Unit::parse(b).unwrap());
+    for (a, b, text, scale) in [
+        ("deg/s", "degC", "deg/s/degC", DEG),
+        ("mg", "K", "mg/K", 1e-3 * G),
+        ("m/s^2", "degF", "m/s^2/degF", 1.8),
+        ("1/131 deg/s", "1/340 degC", "deg/s/degC", DEG),
+    ] {
+        let unit = per(a, b);
+        assert_eq!(unit.text(), text);
+        assert!((unit.scale() / scale - 1.0).abs() < 1e-15, "{text}");
+        assert_eq!(Unit::parse(text).unwrap().dimension(), unit.dimension());
+    }
+    assert_eq!(per("deg/s", "K").dimension().name(), "an angular rate per temperature");
+    assert_eq!(per("deg/s", "K").dimension().example(), "deg/s/degC");
+    assert_eq!(Dimension::TEMPERATURE.example(), "degC");
 }

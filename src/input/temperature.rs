@@ -128,12 +128,15 @@ impl Table<'_> {
     }
 }
 
+/// The column and its values.
+type Read = (AxisInfo, Vec<f64>);
+
 /// The temperature as read, or the note why there is none; the error is what is wrong with a column that was asked for.
 pub(super) fn usable(
     found: Temperature,
     values: Option<Vec<f64>>,
     options: &LogOptions,
-) -> Result<(Option<(AxisInfo, Vec<f64>)>, Option<Finding>), String> {
+) -> Result<(Option<Read>, Option<Finding>), String> {
     let note = |message: String| Finding {
         kind: "temperature".into(),
         axis: None,

@@ -17,6 +17,9 @@ const SHOWN: f64 = 0.05;
 /// Below this share of temperature in what was taken for it, its noise is told.
 const RELIABLE: f64 = 0.9;
 
+/// Beside the longest stretch of an axis in a log, and beside all its pieces.
+type Cut = (Vec<f64>, Vec<Vec<f64>>);
+
 /// The temperature of all logs.
 pub(super) struct Warmth {
     kind: InputKind,
@@ -57,7 +60,7 @@ impl Warmth {
 
     /// Held against one axis; `parts`: its stretches, one per log, of which number `longest` chose the terms.
     pub(super) fn shown(&self, fitted: &Fitted, parts: &[Stretch], longest: usize, dt: f64) -> Shown {
-        let cut = |of: &dyn Fn(&Smoothed) -> Option<&Vec<f64>>| -> Option<Vec<(Vec<f64>, Vec<Vec<f64>>)>> {
+        let cut = |of: &dyn Fn(&Smoothed) -> Option<&Vec<f64>>| -> Option<Vec<Cut>> {
             let one =
                 |(part, (log, gaps)): (&Stretch, &(Smoothed, Vec<Gap>))| Some(part.beside(of(log)?, gaps, self.kind));
             parts.iter().zip(&self.logs).map(one).collect()

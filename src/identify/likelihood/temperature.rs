@@ -232,9 +232,10 @@ impl Data<'_> {
 
     /// xᵀ P x of what is beside the samples.
     fn square(&self, model: &LinearModel, beside: &Beside, scale: f64) -> f64 {
-        // z − z is not a number where z is none
-        let none = total(&self.each(model, beside, |z, _| z - z));
-        2.0 * (none - total(&self.each(model, beside, |z, t| z - z + scale * t)))
+        // what is not there stays not there
+        let zero = |z: f64| if z.is_finite() { 0.0 } else { z };
+        let none = total(&self.each(model, beside, |z, _| zero(z)));
+        2.0 * (none - total(&self.each(model, beside, |z, t| zero(z) + scale * t)))
     }
 
     fn line(&self, model: &LinearModel) -> Result<Line, String> {

@@ -4,6 +4,8 @@ mod document;
 mod kalman;
 mod likelihood;
 mod mismatch;
+mod smoother;
+mod square_root;
 mod steady_state;
 
 use kfdesign::model::{LinearModel, Named};

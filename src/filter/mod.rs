@@ -24,6 +24,8 @@ pub mod likelihood;
 pub mod mismatch;
 mod reading;
 pub(crate) mod rows;
+pub mod smoother;
+pub mod square_root;
 pub mod steady_state;
 mod transition;
 
@@ -32,4 +34,5 @@ pub use document::{AxisDesign, FilterDesign, FilterError};
 pub use gains::GainSequence;
 pub use judge::Judge;
 pub use kalman::Kalman;
+pub use square_root::SquareRoot;
 pub use steady_state::{SteadyState, SteadyStateError, steady_state};

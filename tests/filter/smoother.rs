@@ -1,0 +1,99 @@
+//! Smoothed estimates against the conditional normal distribution of all states given all measurements.
+
+use kfdesign::filter::smoother::{Measured, smooth};
+use kfdesign::model::LinearModel;
+use nalgebra::{DMatrix, DVector};
+
+use super::square_root::{normals, two_measurements};
+use super::{bias_and_drift, drift};
+
+/// E[x_k | z] and its covariance for every k, from the joint covariance of all states and measurements (no recursion but x ← F x):
+/// with X the stacked states, Z = A X + w: E = μ + C Aᵀ (A C Aᵀ + R)⁻¹ (z − A μ).
+fn batch(m: &LinearModel, z: &[Vec<f64>], u: &[Vec<f64>]) -> (Vec<DVector<f64>>, Vec<DMatrix<f64>>) {
+    let (n, samples) = (m.x0.len(), z[0].len());
+    let mut mean = DVector::zeros(n * samples);
+    let mut c = DMatrix::zeros(n * samples, n * samples);
+    let (mut x, mut p) = (m.x0.clone(), m.p0.clone());
+    for k in 0..samples {
+        if k > 0 {
+            x = &m.f * x;
+            for (j, series) in u.iter().enumerate() {
+                x += m.g.column(j) * series[k - 1];
+            }
+            p = &m.f * p * m.f.transpose() + &m.q;
+        }
+        mean.rows_mut(k * n, n).copy_from(&x);
+        // Cov(x_l, x_k) = F^(l−k) P_k for l ≥ k
+        let mut block = p.clone();
+        for l in k..samples {
+            c.view_mut((l * n, k * n), (n, n)).copy_from(&block);
+            c.view_mut((k * n, l * n), (n, n)).copy_from(&block.transpose());
+            block = &m.f * block;
+        }
+    }
+    let rows: Vec<(usize, usize)> = (0..samples)
+        .flat_map(|k| (0..z.len()).map(move |i| (k, i)))
+        .filter(|(k, i)| k % m.every[*i] == 0 && !z[*i][*k].is_nan())
+        .collect();
+    let mut a = DMatrix::zeros(rows.len(), n * samples);
+    let mut r = DMatrix::zeros(rows.len(), rows.len());
+    for (row, (k, i)) in rows.iter().enumerate() {
+        a.view_mut((row, k * n), (1, n)).copy_from(&m.h.row(*i));
+        r[(row, row)] = m.r[(*i, *i)];
+    }
+    let seen = DVector::from_iterator(rows.len(), rows.iter().map(|(k, i)| z[*i][*k]));
+    let cross = &c * a.transpose();
+    let inverse = (&a * &cross + r).cholesky().unwrap().inverse();
+    let x = &mean + &cross * &inverse * (seen - &a * &mean);
+    let p = &c - &cross * &inverse * cross.transpose();
+    let states = (0..samples).map(|k| x.rows(k * n, n).into_owned()).collect();
+    (states, (0..samples).map(|k| p.view((k * n, k * n), (n, n)).into_owned()).collect())
+}
+
+/// 60 samples with holes, singular Q, an input, two rates: x to 1e-9 of its sigma, sigma to 1e-9; the last sample is the filtered one.
+#[test]
+fn equals_batch_least_squares() {
+    let slow = drift(0.03, 40.0, 0.05, 1.0);
+    for (case, m) in [slow, bias_and_drift(), two_measurements()].into_iter().enumerate() {
+        let samples = 60;
+        let z: Vec<Vec<f64>> = (0..m.measurements.len())
+            .map(|i| {
+                let mut z = normals(samples, 80 + i as u64);
+                z.iter_mut().for_each(|z| *z *= 2.0 * m.r[(i, i)].sqrt());
+                z[7] = f64::NAN;
+                z[20..32].fill(f64::NAN);
+                z
+            })
+            .collect();
+        let u: Vec<Vec<f64>> = m.inputs.iter().map(|_| normals(samples, 90)).collect();
+        let (series, driven): (Vec<&[f64]>, Vec<&[f64]>) =
+            (z.iter().map(Vec::as_slice).collect(), u.iter().map(Vec::as_slice).collect());
+        let found = smooth(&m, &Measured { measurements: &series, inputs: &driven, gate: None });
+        let (x, p) = batch(&m, &z, &u);
+        for k in 0..samples {
+            for s in 0..m.x0.len() {
+                let sigma = p[k][(s, s)].sqrt();
+                assert!((found.smoothed[s][k] - x[k][s]).abs() < 1e-9 * sigma, "case {case}, sample {k}");
+                assert!((found.smoothed_sigma[s][k] / sigma - 1.0).abs() < 1e-9, "case {case}, sample {k}");
+                assert!(found.smoothed_sigma[s][k] <= found.filtered_sigma[s][k] * (1.0 + 1e-12));
+            }
+        }
+        for s in 0..m.x0.len() {
+            assert_eq!(found.smoothed[s][samples - 1], found.filtered[s][samples - 1]);
+        }
+    }
+}
+
+/// A rejected outlier changes nothing: the same as a missing value.
+#[test]
+fn outliers_behind_the_gate_are_left_out() {
+    let m = drift(0.03, 40.0, 0.05, 1.0);
+    let mut z = normals(50, 99);
+    z.iter_mut().for_each(|z| *z *= 0.05);
+    let run = |z: &[f64], gate| smooth(&m, &Measured { measurements: &[z], inputs: &[], gate });
+    z[30] = f64::NAN;
+    let without = run(&z, Some(8.0));
+    z[30] = 5.0;
+    assert_eq!(run(&z, Some(8.0)), without);
+    assert_ne!(run(&z, None), without);
+}

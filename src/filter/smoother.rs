@@ -110,7 +110,7 @@ fn step(model: &LinearModel, measured: &Measured<'_>, filter: &mut Kalman, k: us
         filter.drive(&driven);
     }
     for (measurement, series) in measured.measurements.iter().enumerate() {
-        if k % model.every[measurement] != 0 || series[k].is_nan() {
+        if !k.is_multiple_of(model.every[measurement]) || series[k].is_nan() {
             continue;
         }
         let h = model.h.row(measurement).transpose();

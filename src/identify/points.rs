@@ -69,13 +69,9 @@ pub(super) struct Covariance {
 }
 
 impl Points {
-    /// Points at averaging times up to half the log; of the variances themselves, which are far from normal there, up to a third.
+    /// Points at averaging times up to a third of the log (three averages and more).
     pub(super) fn of_curve(curve: &AllanCurve, distance: Distance) -> Points {
-        let averages = match distance {
-            Distance::CubeRoots => 2,
-            Distance::Variances => 3,
-        };
-        let used = curve.points.iter().filter(|p| p.m as usize <= curve.samples / averages && p.deviation > 0.0);
+        let used = curve.points.iter().filter(|p| p.m as usize <= curve.samples / 3 && p.deviation > 0.0);
         let (factors, variances) = used.map(|p| (p.m, p.deviation * p.deviation)).unzip();
         let parts = Mutex::new(BTreeMap::new());
         let table = Table { factors, variances, samples: curve.samples, dt: curve.dt, distance, parts };

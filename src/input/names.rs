@@ -245,11 +245,14 @@ fn suffixed(text: &str) -> Option<(&str, &'static str)> {
         return Some(found);
     }
     let all = words(text);
-    if is_temperature(&all)
-        && let Some(unit) = all.last().and_then(|word| TEMPERATURE_UNITS.iter().find(|(suffix, _)| word == suffix))
-    {
-        let name = text.get(..text.len().checked_sub(unit.0.len())?)?;
-        return Some((name.trim_end_matches(['_', ' ', '.', '-']), unit.1));
+    if is_temperature(&all) {
+        // `degC` is two words to one who splits at capitals, and `imuTempF` one text to one who splits at separators
+        let whole = TEMPERATURE_UNITS.iter().filter_map(|(suffix, unit)| Some((cut(suffix)?, *unit)));
+        let last = TEMPERATURE_UNITS.iter().filter(|(suffix, _)| all.last().is_some_and(|word| word == suffix));
+        let glued = last.filter_map(|(suffix, unit)| Some((text.get(..text.len().checked_sub(suffix.len())?)?, *unit)));
+        if let Some((name, unit)) = whole.chain(glued).min_by_key(|(name, _)| name.len()) {
+            return Some((name.trim_end_matches(['_', ' ', '.', '-']), unit));
+        }
     }
     for (suffix, unit) in TIME_SUFFIXES {
         if lower == suffix && suffix.len() > 2 {

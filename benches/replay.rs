@@ -69,6 +69,7 @@ fn blocks() -> Vec<Block> {
         .map(|start| start..(start + BLOCK).min(SAMPLES))
         .map(|range| Block {
             values: columns.iter().map(|c| c[range.clone()].to_vec()).collect(),
+            extra: vec![],
             missing: vec![0; range.len()],
             time_s: range.map(|k| k as f64 * 0.01).collect(),
         })
@@ -89,6 +90,7 @@ fn bench(criterion: &mut Criterion) {
         axes: names.iter().map(ToString::to_string).collect(),
         quantity: Quantity::AngularRate,
         sample_rate_hz: 100.0,
+        aids: 0,
     };
     let blocks = blocks();
     let mut group = criterion.benchmark_group("replay, 3 axes of 1e5 samples, 2 states");

@@ -4,6 +4,7 @@ mod flights;
 mod matrices;
 mod property;
 mod refused;
+mod replay;
 
 use kfdesign::params::Params;
 

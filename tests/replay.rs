@@ -80,6 +80,7 @@ fn shape(axes: &[&str], rate: f64) -> LogShape {
         axes: axes.iter().map(ToString::to_string).collect(),
         quantity: Quantity::AngularRate,
         sample_rate_hz: rate,
+        aids: 0,
     }
 }
 
@@ -87,6 +88,7 @@ fn shape(axes: &[&str], rate: f64) -> LogShape {
 fn block(z: &[f64], missing: &[u64], dt: f64, range: std::ops::Range<usize>) -> Block {
     Block {
         values: vec![z[range.clone()].to_vec()],
+        extra: vec![],
         missing: missing[range.clone()].to_vec(),
         time_s: range.map(|k| k as f64 * dt).collect(),
     }
@@ -131,16 +133,16 @@ fn check(rows: &[Row], gate: Option<f64>, log_likelihood: f64, nis: f64, counts:
     for &(k, innovation, sigma, x, s) in rows {
         let (estimates, i) = if k < 18 { (&first, k) } else { (&second, k - 18) };
         let out = &estimates.axes[0];
-        assert_relative_eq!(out.innovation[i], innovation, max_relative = 1e-11);
-        assert_relative_eq!(out.innovation_sigma[i], sigma, max_relative = 1e-12);
-        assert_relative_eq!(out.nis[i], (innovation / sigma).powi(2), max_relative = 1e-11);
+        assert_relative_eq!(out.updates[0].innovation[i], innovation, max_relative = 1e-11);
+        assert_relative_eq!(out.updates[0].innovation_sigma[i], sigma, max_relative = 1e-12);
+        assert_relative_eq!(out.updates[0].nis[i], (innovation / sigma).powi(2), max_relative = 1e-11);
         for state in 0..2 {
             assert_relative_eq!(out.states[state][i], x[state], max_relative = 1e-10);
             assert_relative_eq!(out.sigmas[state][i], s[state], max_relative = 1e-11);
         }
     }
     let skipped = &first.axes[0];
-    assert!(skipped.innovation[7].is_nan() && skipped.nis[7].is_nan());
+    assert!(skipped.updates[0].innovation[7].is_nan() && skipped.updates[0].nis[7].is_nan());
     assert!(skipped.sigmas[0][7] >= skipped.sigmas[0][6], "a skipped sample is a prediction only");
     let result = replayer.finish();
     let axis = &result.axes[0];

@@ -73,6 +73,7 @@ impl LogFlags {
                 SensorArg::Accel => Quantity::SpecificForce,
             }),
             temperature: TemperatureColumn::Ignored,
+            extra: Vec::new(),
         })
     }
 }

@@ -6,6 +6,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 pub use crate::units::digits;
+use crate::units::{Quantity, Unit};
 
 /// One machine-readable document on stdout.
 pub fn print_json<T: Serialize>(value: &T) -> anyhow::Result<()> {
@@ -91,4 +92,18 @@ pub fn table(header: &[&str], rows: &[Vec<String>]) -> String {
         out.push('\n');
     }
     out
+}
+
+/// That of the quantity is shown in the unit of the axis, its integral and its derivative (an angle, an acceleration) in the unit that
+/// goes with it, others in SI: scale and text.
+pub fn shown_unit(si: &str, quantity: Quantity, unit: &Unit) -> (f64, String) {
+    if si == quantity.si_unit() {
+        return (unit.scale(), unit.to_string());
+    }
+    let dimension = Unit::parse(si).map(|si| si.dimension());
+    let family = [2, -2].map(|half_powers| unit.times_time(half_powers));
+    match family.into_iter().find(|unit| dimension == Ok(unit.dimension())) {
+        Some(unit) => (unit.scale(), unit.to_string()),
+        None => (1.0, si.to_owned()),
+    }
 }

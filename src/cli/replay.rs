@@ -2,21 +2,22 @@
 
 mod sight;
 
+use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::PathBuf;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 
 use super::Status;
 use super::log_flags::{LogFlags, print_check};
-use super::output::{digits, print_json, print_text, progress, table};
+use super::output::{digits, print_json, print_text, progress, shown_unit, table};
 use super::tests_table::{TESTS, caption, rows};
 use crate::consistency::Verdict;
 use crate::export::atomic::{AtomicFile, refuse_input_as_output};
 use crate::export::table::TableWriter;
 use crate::filter::FilterDesign;
-use crate::input::{Block, LogReader};
-use crate::replay::{AxisResult, Estimates, LogShape, Options, ReplayResult, Replayer};
+use crate::input::{Block, ExtraColumn, LogOptions, LogReader};
+use crate::replay::{AxisResult, Estimates, LogShape, Options, ReplayResult, Replayer, aids};
 use crate::units::{Quantity, Unit};
 
 /// A recorded log through filter.json, with a verdict
@@ -51,6 +52,10 @@ pub struct Args {
     /// One JSON document on stdout
     #[arg(long)]
     json: bool,
+    /// Column of an aid of the filter, one per axis: NAME=COLUMN[,COLUMN…], with the unit if the header does not say it: heading=yaw:deg.
+    /// A row without a number is one without that measurement
+    #[arg(long, value_name = "NAME=COLUMN")]
+    aid: Vec<String>,
     #[command(flatten)]
     reading: LogFlags,
 }
@@ -63,13 +68,19 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         refuse_input_as_output(output, &args.log)?;
         refuse_input_as_output(output, &args.filter)?;
     }
-    let mut reader = LogReader::open(&args.log, &args.reading.options()?)?;
+    let extra = aid_columns(&args.aid, &design).with_context(|| args.filter.display().to_string())?;
+    let extra_columns = extra.len();
+    let mut reader = LogReader::open(&args.log, &LogOptions { extra, ..args.reading.options()? })?;
     let name = args.log.display().to_string();
-    print_check(&name, reader.check());
+    let mut check = reader.check().clone();
+    // a plant's log is one that moves
+    check.findings.retain(|finding| design.plant == "static" || finding.kind != "motion");
+    print_check(&name, &check);
     let shape = LogShape {
         axes: reader.axes().iter().map(|a| a.name.clone()).collect(),
         quantity: reader.quantity(),
         sample_rate_hz: reader.check().sample_rate_hz,
+        aids: extra_columns,
     };
     let replayer = Replayer::new(&design, &shape, options).with_context(|| name.clone())?;
     say_assignment(&design, &replayer, &shape);
@@ -79,6 +90,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let mut result = stream(args, &design, replayer, &mut reader)?;
     result.log = Some(name);
     result.log_sha256 = Some(reader.sha256().to_string());
+    say_rates(&design, &result);
     let unit = reader.axes().first().map(|a| a.unit.clone());
     if let Some(mut file) = plot {
         file.write_all(sight::sheet(&result, unit.as_ref()).as_bytes()).context("plot")?;
@@ -98,6 +110,70 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         Verdict::Inconsistent => Status::CheckFailed,
         Verdict::Consistent | Verdict::Inconclusive => Status::Done,
     })
+}
+
+/// The extra columns of the log, in the order of [`aids`].
+fn aid_columns(flags: &[String], design: &FilterDesign) -> anyhow::Result<Vec<ExtraColumn>> {
+    let needed = aids(design)?;
+    let mut given: Vec<(&str, Vec<&str>)> = Vec::new();
+    for flag in flags {
+        let (name, columns) = flag.split_once('=').with_context(|| format!("--aid {flag}: expected NAME=COLUMN"))?;
+        let (name, columns) = (name.trim(), columns.split(',').map(str::trim).collect::<Vec<_>>());
+        let axes = needed.iter().filter(|aid| aid.measurement.name == name).count();
+        if axes == 0 {
+            let known: BTreeSet<&str> = needed.iter().map(|aid| aid.measurement.name.as_str()).collect();
+            let known = if known.is_empty() { "none".into() } else { known.into_iter().collect::<Vec<_>>().join(", ") };
+            bail!("--aid {flag}: the filter has no measurement '{name}' beside the sensor; it has {known}");
+        }
+        if given.iter().any(|(known, _)| *known == name) {
+            bail!("--aid {flag}: '{name}' is given twice");
+        }
+        if columns.len() != axes {
+            bail!(
+                "--aid {flag}: {} columns for {axes} axes; expected one per axis of the filter, in its order",
+                columns.len()
+            );
+        }
+        given.push((name, columns));
+    }
+    let mut taken = vec![0; given.len()];
+    let mut extra = Vec::with_capacity(needed.len());
+    for aid in &needed {
+        let measurement = &aid.measurement;
+        let Some(at) = given.iter().position(|(name, _)| *name == measurement.name) else {
+            bail!(
+                "the filter measures {} beside the sensor; say which column that is, --aid {0}=COLUMN",
+                measurement.name
+            );
+        };
+        let text = given[at].1[taken[at]];
+        taken[at] += 1;
+        // a unit behind the last colon, unless the name itself has it
+        let unit = text.rsplit_once(':').and_then(|(column, unit)| Some((column, Unit::parse(unit).ok()?)));
+        let (column, unit) = unit.map_or((text, None), |(column, unit)| (column, Some(unit)));
+        let dimension = Unit::parse(&measurement.unit).with_context(|| measurement.name.clone())?.dimension();
+        let flag = format!("--aid {}={column}", measurement.name);
+        extra.push(ExtraColumn { column: column.to_string(), unit, dimension, flag });
+    }
+    Ok(extra)
+}
+
+/// One line on stderr for an aid that comes at another rate than the filter was made for.
+fn say_rates(design: &FilterDesign, result: &ReplayResult) {
+    let every = design.axes.iter().flat_map(|axis| axis.model.every.iter());
+    for (axis, every) in result.axes.iter().zip(every) {
+        let expected = (axis.samples / *every as u64).max(1) as f64;
+        let ratio = (axis.accepted + axis.rejected) as f64 / expected;
+        if *every > 1 && !(0.5..=2.0).contains(&ratio) {
+            eprintln!(
+                "  warning: {} has {} measurements in {} rows, the filter was made for one in {every}; empty the rows that repeat an \
+                 older value, or tune with the aid's true rate",
+                axis.measurement,
+                axis.accepted + axis.rejected,
+                axis.samples
+            );
+        }
+    }
 }
 
 /// One line on stderr when names had to be matched or axes are left out.
@@ -149,16 +225,20 @@ fn stream(
 
 fn header(design: &FilterDesign, innovations: bool) -> Vec<String> {
     let mut names = vec!["time (s)".to_string()];
-    let unit = design.quantity.si_unit();
     for axis in &design.axes {
         for state in &axis.model.states {
             names.push(format!("{}_{} ({})", axis.name, state.name, state.unit));
             names.push(format!("{}_{}_sigma ({})", axis.name, state.name, state.unit));
         }
-        if innovations {
-            names.push(format!("{}_innovation ({unit})", axis.name));
-            names.push(format!("{}_innovation_sigma ({unit})", axis.name));
-            names.push(format!("{}_nis", axis.name));
+        for measurement in axis.model.measurements.iter().filter(|_| innovations) {
+            let unit = &measurement.unit;
+            let name = match axis.model.measurements.len() {
+                1 => axis.name.clone(),
+                _ => format!("{}_{}", axis.name, measurement.name),
+            };
+            names.push(format!("{name}_innovation ({unit})"));
+            names.push(format!("{name}_innovation_sigma ({unit})"));
+            names.push(format!("{name}_nis"));
         }
     }
     names
@@ -170,8 +250,8 @@ fn columns(estimates: &Estimates, innovations: bool) -> Vec<&[f64]> {
         for (state, sigma) in axis.states.iter().zip(&axis.sigmas) {
             columns.extend([state.as_slice(), sigma.as_slice()]);
         }
-        if innovations {
-            columns.extend([axis.innovation.as_slice(), axis.innovation_sigma.as_slice(), axis.nis.as_slice()]);
+        for update in axis.updates.iter().filter(|_| innovations) {
+            columns.extend([update.innovation.as_slice(), update.innovation_sigma.as_slice(), update.nis.as_slice()]);
         }
     }
     columns
@@ -212,23 +292,30 @@ fn count_rows(result: &ReplayResult) -> Vec<Vec<String>> {
     result.axes.iter().map(row).collect()
 }
 
-/// The whole estimate of each axis, and its states where they are few; all are in the JSON document.
+/// The whole estimate of each axis, and its states where they are few; all are in the JSON document. Measurements of one axis share them.
 fn state_rows(result: &ReplayResult, unit: Option<&Unit>) -> Vec<Vec<String>> {
-    let mut rows = Vec::new();
+    let mut rows: Vec<Vec<String>> = Vec::new();
     for axis in &result.axes {
-        let few = if axis.final_state.len() <= 3 { axis.final_state.as_slice() } else { &[] };
-        for state in std::iter::once(&axis.final_output).chain(few) {
+        let few = if axis.final_state.len() <= 3 || axis.of_plant { axis.final_state.as_slice() } else { &[] };
+        let whole = Some(&axis.final_output).filter(|_| !axis.of_plant);
+        for state in whole.into_iter().chain(few) {
             let (value, sigma, shown) = in_log_unit(state.value, state.sigma, &state.unit, result.quantity, unit);
-            rows.push(vec![axis.name.clone(), state.name.clone(), digits(value), digits(sigma), shown]);
+            let row = vec![axis.axis.clone(), state.name.clone(), digits(value), digits(sigma), shown];
+            if !rows.contains(&row) {
+                rows.push(row);
+            }
         }
     }
     rows
 }
 
-/// States of the measured quantity are shown in the log's unit, others as they are.
+/// States of the measured quantity are shown in the log's unit, angles in the one that goes with it, others as they are.
 fn in_log_unit(value: f64, sigma: f64, si: &str, quantity: Quantity, log: Option<&Unit>) -> (f64, f64, String) {
-    match log.filter(|u| si == quantity.si_unit() && u.dimension() == quantity.dimension()) {
-        Some(unit) => (unit.from_si(value), unit.from_si(sigma), unit.to_string()),
+    match log.filter(|u| u.dimension() == quantity.dimension()) {
+        Some(unit) => {
+            let (scale, text) = shown_unit(si, quantity, unit);
+            (value / scale, sigma / scale, text)
+        }
         None => (value, sigma, si.to_string()),
     }
 }

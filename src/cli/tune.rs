@@ -166,6 +166,7 @@ fn replay(args: &Args, tuned: &Tuned, log: &Path) -> anyhow::Result<ReplayResult
         axes: reader.axes().iter().map(|a| a.name.clone()).collect(),
         quantity: reader.quantity(),
         sample_rate_hz: reader.check().sample_rate_hz,
+        aids: 0,
     };
     let mut replayer = Replayer::new(&tuned.design, &shape, Options::default()).with_context(|| name.clone())?;
     let mut block = Block::default();

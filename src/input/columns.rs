@@ -4,7 +4,7 @@ use super::names::{Head, axis_at, is_excluded, sensor_of, time_rank, words};
 use super::temperature::Temperature;
 use crate::units::{Dimension, Quantity, Unit};
 
-use super::{AxisInfo, InputError, InputKind, LogOptions};
+use super::{AxisInfo, ExtraColumn, InputError, InputKind, LogOptions};
 
 /// What to read: the time column and its unit, the axes, what they measure, the temperature beside them.
 #[derive(Clone, Debug)]
@@ -14,6 +14,8 @@ pub(super) struct Choice {
     pub(super) axes: Vec<AxisInfo>,
     pub(super) quantity: Quantity,
     pub(super) temperature: Temperature,
+    /// Units of the extra columns, which come after the axes in `columns`.
+    pub(super) extra: Vec<Unit>,
 }
 
 /// The columns of a log.
@@ -53,7 +55,17 @@ impl Table<'_> {
             return self.fail(format!("column '{}' is taken both as time and as an axis", self.heads[*time].full));
         }
         let temperature = self.temperature(&options.temperature, &columns, time.as_ref().map(|(c, _)| *c), quantity)?;
-        Ok(Choice { time, columns, axes, quantity, temperature })
+        let mut columns = columns;
+        let mut extra = Vec::with_capacity(options.extra.len());
+        for wanted in &options.extra {
+            let column = self.find(&wanted.column)?;
+            if columns.contains(&column) || time.as_ref().is_some_and(|(time, _)| *time == column) {
+                return self.fail(format!("column '{}' is asked for twice ({})", self.heads[column].full, wanted.flag));
+            }
+            columns.push(column);
+            extra.push(self.extra(self.heads[column], wanted)?);
+        }
+        Ok(Choice { time, columns, axes, quantity, temperature, extra })
     }
 
     pub(super) fn fail<T>(&self, what: impl std::fmt::Display) -> Result<T, InputError> {
@@ -176,6 +188,25 @@ impl Table<'_> {
                 .fail(format!("more than one sensor could be meant: {}; choose with --columns", names.join(", ")));
         }
         Ok(candidates.iter().map(|c| c.column).collect())
+    }
+
+    /// Unit of an extra column.
+    fn extra(&self, head: &Head, wanted: &ExtraColumn) -> Result<Unit, InputError> {
+        let (full, flag) = (&head.full, &wanted.flag);
+        let unit = match (&head.unit, &wanted.unit) {
+            (Some(header), Some(said)) if !same(header, said) => {
+                return self.fail(format!("column '{full}' is in {header} by its header, but {flag} says {said}"));
+            }
+            (Some(unit), _) | (None, Some(unit)) => unit.clone(),
+            (None, None) => {
+                let example = wanted.dimension.example();
+                return self.fail(format!("no unit is known for column '{full}'; say it with {flag}:{example}"));
+            }
+        };
+        match unit.require(wanted.dimension) {
+            Ok(()) => Ok(unit),
+            Err(error) => self.fail(format!("column '{full}' ({flag}): {error}")),
+        }
     }
 
     /// Unit of each column from the header or the flag, never both different, never neither.

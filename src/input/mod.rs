@@ -17,7 +17,7 @@ use self::columns::Choice;
 use self::names::Head;
 use crate::signal::check::{AxisRange, BackwardStamp, Checker, Outcome, TimeBase};
 use crate::signal::{Axis, Gap, LogCheck, Recording};
-use crate::units::{Quantity, Unit};
+use crate::units::{Dimension, Quantity, Unit};
 
 pub use crate::signal::check::InputKind;
 pub use temperature::TemperatureColumn;
@@ -42,6 +42,20 @@ pub struct LogOptions {
     pub quantity: Option<Quantity>,
     /// Only [`read`] takes it.
     pub temperature: TemperatureColumn,
+    /// Columns beside the axes, of any dimension.
+    pub extra: Vec<ExtraColumn>,
+}
+
+/// A column that is no axis of the sensor: its empty fields are no fault of the log.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExtraColumn {
+    /// Name or 1-based number.
+    pub column: String,
+    /// When the header does not say it.
+    pub unit: Option<Unit>,
+    pub dimension: Dimension,
+    /// How the unit is said: "--aid heading=yaw:deg".
+    pub flag: String,
 }
 
 /// One line: file, line or column, found, expected, what to do.
@@ -63,6 +77,8 @@ pub struct AxisInfo {
 pub struct Block {
     /// Per axis, SI values (NaN: unusable). All the same length.
     pub values: Vec<Vec<f64>>,
+    /// The extra columns that were asked for, likewise.
+    pub extra: Vec<Vec<f64>>,
     /// Per sample: how many samples are missing right before it (0 nearly always).
     pub missing: Vec<u64>,
     /// Seconds from the first sample of the log, per sample.
@@ -226,9 +242,10 @@ impl Log {
                 });
             }
         }
-        let beside = self.choice.temperature.column.as_ref().map(|(_, info)| info);
-        for (column, info) in rows.values.iter_mut().zip(self.choice.axes.iter().chain(beside)) {
-            column.iter_mut().for_each(|x| *x = info.unit.to_si(*x));
+        let beside = self.choice.temperature.column.as_ref().map(|(_, info)| &info.unit);
+        let units = self.choice.axes.iter().map(|axis| &axis.unit).chain(&self.choice.extra).chain(beside);
+        for (column, unit) in rows.values.iter_mut().zip(units) {
+            column.iter_mut().for_each(|x| *x = unit.to_si(*x));
         }
         let stamped = self.stamped();
         let rate = self.options.rate_hz.unwrap_or(f64::NAN);
@@ -364,7 +381,8 @@ impl LogReader {
         block.missing.clear();
         block.time_s.clear();
         block.values.resize_with(self.axes().len(), Vec::new);
-        block.values.iter_mut().for_each(Vec::clear);
+        block.extra.resize_with(self.log.choice.extra.len(), Vec::new);
+        block.values.iter_mut().chain(&mut block.extra).for_each(Vec::clear);
         while !self.ended {
             let Some((wanted, last)) = self.log.next(&mut self.selection, &mut self.rows)? else {
                 self.ended = true;
@@ -374,7 +392,7 @@ impl LogReader {
             if wanted.is_empty() {
                 continue;
             }
-            for (out, column) in block.values.iter_mut().zip(&self.rows.values) {
+            for (out, column) in block.values.iter_mut().chain(&mut block.extra).zip(&self.rows.values) {
                 out.extend_from_slice(&column[wanted.clone()]);
             }
             let stamped = self.scan.check.time_base == TimeBase::Stamps;

@@ -1,26 +1,27 @@
 //! A log through a design to a verdict (floor 4).
 //!
 //! [`Replayer`] takes the log block by block and keeps only running sums, so its memory does not grow with the log.
-//! Over a gap the filter predicts and nothing else; a sample that is not a number is skipped (prediction only); a sample outside the gate, if there is
+//! The sensor of a plant is an input or the first measurement; aids are extra columns, and a row without a number is one without that
+//! measurement. Measured angles are taken modulo a turn: the innovation is the nearest one.
+//! Over a gap the filter predicts and nothing else (an input keeps its last value); a sample that is not a number is skipped (prediction only); a sample outside the gate, if there is
 //! one, is counted and does not change the state. The statistics use the normalised innovations of accepted samples; see
 //! [`verdict`] for what is tested and [`crate::consistency::effect::judge`] for how the verdict on a measured log is reached.
 
 pub mod axes;
+mod axis;
 pub mod trace;
 pub mod verdict;
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::consistency::low_frequency::{LowFrequency, time_constants};
-use crate::consistency::whiteness::Autocorrelation;
 use crate::consistency::{Test, Verdict};
-use crate::filter::kalman::{Kalman, Update};
 use crate::filter::{AxisDesign, FilterDesign};
 use crate::input::Block;
-use crate::numerics::reduce::Sum;
+use crate::model::{LinearModel, Named};
 use crate::units::Quantity;
 
+use axis::AxisReplay;
 pub use trace::{Point, Trace};
 
 /// Number of autocorrelation lags that are tested.
@@ -64,6 +65,33 @@ pub struct LogShape {
     pub axes: Vec<String>,
     pub quantity: Quantity,
     pub sample_rate_hz: f64,
+    /// Extra columns, in the order of [`aids`].
+    pub aids: usize,
+}
+
+/// A measurement of a design that is not of its sensor.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Aid {
+    pub axis: String,
+    pub measurement: Named,
+}
+
+/// What a log must have beside the sensor, axis by axis. Errors: a custom plant with more than the sensor.
+pub fn aids(design: &FilterDesign) -> Result<Vec<Aid>, ReplayError> {
+    let more = |axis: &AxisDesign| axis.model.inputs.len() + axis.model.measurements.len() > 1;
+    if design.plant == "custom" && design.axes.iter().any(more) {
+        return Err(ReplayError::Custom);
+    }
+    let of_axis = |axis: &AxisDesign| {
+        let aids = axis.model.measurements[sensors(&axis.model)..].iter();
+        aids.map(|measurement| Aid { axis: axis.name.clone(), measurement: measurement.clone() }).collect::<Vec<_>>()
+    };
+    Ok(design.axes.iter().flat_map(of_axis).collect())
+}
+
+/// Measurements that are of the sensor itself: the first, unless the sensor is an input.
+fn sensors(model: &LinearModel) -> usize {
+    usize::from(model.inputs.is_empty())
 }
 
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -81,13 +109,15 @@ pub enum ReplayError {
     )]
     Axes { log: String, filter: String },
     #[error(
-        "axis '{axis}' of the filter has {count} measurements; replay handles filters with one measurement per axis"
+        "the filter of plant '{plant}' measures {names} beside the sensor, the log gives {found} such columns; name the columns, one per \
+         axis: replay --aid NAME=COLUMN"
     )]
-    Measurements { axis: String, count: usize },
+    Aids { plant: String, names: String, found: usize },
     #[error(
-        "the filter is for the plant '{plant}'; replay handles sensors at rest (plant static), montecarlo judges this filter on simulated runs"
+        "the filter is for a custom plant with an input or a measurement that is not the sensor's; replay handles the plants static, angle, \
+         rate and vertical, montecarlo judges this one on simulated runs"
     )]
-    Plant { plant: String },
+    Custom,
     #[error("{name} is {value}, expected {expected}")]
     Option { name: &'static str, value: f64, expected: &'static str },
 }
@@ -107,6 +137,13 @@ pub struct AxisEstimates {
     pub states: Vec<Vec<f64>>,
     /// Square root of the diagonal of P, likewise.
     pub sigmas: Vec<Vec<f64>>,
+    /// One per measurement.
+    pub updates: Vec<UpdateEstimates>,
+}
+
+/// One measurement of [`AxisEstimates`], SI.
+#[derive(Clone, Debug, Default)]
+pub struct UpdateEstimates {
     /// ν, also of rejected samples; NaN where there was no usable measurement.
     pub innovation: Vec<f64>,
     /// √S.
@@ -179,8 +216,16 @@ pub struct FinalState {
 /// One axis of [`ReplayResult`], SI units.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct AxisResult {
-    /// Of the filter.
+    /// Of the filter; with the measurement behind it where there are several ("z.heading").
     pub name: String,
+    /// Of the filter.
+    pub axis: String,
+    /// Whether the sensor is part of a plant; else it rests.
+    pub of_plant: bool,
+    /// What was measured.
+    pub measurement: String,
+    /// SI unit of it.
+    pub unit: String,
     pub log_axis: String,
     /// Samples in the log.
     pub samples: u64,
@@ -195,7 +240,8 @@ pub struct AxisResult {
     pub rejected: u64,
     /// Σ −½(ln 2πS + ν²/S) over every accepted sample.
     pub log_likelihood: f64,
-    /// The whole drift at the end of the log: what the filter expects a sensor at rest to show, but for noise of the measurement.
+    /// The whole drift at the end of the log: what the filter expects a sensor at rest to show, but for noise of the measurement. Of a
+    /// plant, its first state.
     pub final_output: FinalState,
     pub final_state: Vec<FinalState>,
     /// Absent when too few samples were accepted.
@@ -245,41 +291,6 @@ pub struct ReplayResult {
     pub tests: Vec<Test>,
 }
 
-/// One axis in progress.
-#[derive(Clone, Debug)]
-struct AxisReplay {
-    kalman: Kalman,
-    every: u64,
-    drift: Vec<f64>,
-    gate: Option<f64>,
-    /// Steps since the first sample.
-    step: u64,
-    started: bool,
-    start: StartTest,
-    autocorrelation: Autocorrelation,
-    low_frequency: LowFrequency,
-    log_likelihood: Sum,
-    samples: u64,
-    unusable: u64,
-    gaps: u64,
-    missing: u64,
-    rejected: u64,
-    trace: Trace,
-    nis_histogram: [u64; NIS_BINS],
-}
-
-/// The score test of x0: a second filter, shifted at the start by one standard deviation of P0 in the direction that the first
-/// measurement sees, shows how innovations answer to such a shift; they are projected on that answer.
-#[derive(Clone, Debug)]
-struct StartTest {
-    shifted: Option<Kalman>,
-    /// Steps after which the answer has died away.
-    until: u64,
-    /// Σ d ν/S and Σ d²/S, d = difference of the innovations.
-    score: f64,
-    information: f64,
-}
-
 /// Streams a log through a design.
 #[derive(Clone, Debug)]
 pub struct Replayer {
@@ -292,9 +303,15 @@ pub struct Replayer {
 }
 
 impl Replayer {
-    /// Checks quantity, rate and axes (see [`axes::assign`]) and starts every filter at x0, P0.
+    /// Checks quantity, rate and axes (see [`axes::assign`]) and that every aid has a column, and starts every filter at x0, P0.
     pub fn new(design: &FilterDesign, log: &LogShape, options: Options) -> Result<Replayer, ReplayError> {
         options.check()?;
+        let needed = aids(design)?;
+        if needed.len() != log.aids {
+            let mut names: Vec<String> = needed.into_iter().map(|aid| aid.measurement.name).collect();
+            names.dedup();
+            return Err(ReplayError::Aids { plant: design.plant.clone(), names: names.join(", "), found: log.aids });
+        }
         let assigned = axes::assign(design, log)?;
         Ok(Replayer {
             options,
@@ -317,16 +334,18 @@ impl Replayer {
             estimates.axes.resize_with(self.axes.len(), AxisEstimates::default);
             estimates.axes.iter_mut()
         });
+        let mut extra = block.extra.iter();
         for (axis, &column) in self.axes.iter_mut().zip(&self.assigned) {
+            let aids: Vec<&[f64]> = extra.by_ref().take(axis.aids()).map(Vec::as_slice).collect();
             let mut output = outputs.as_mut().and_then(Iterator::next);
             if let Some(output) = &mut output {
-                output.clear(axis.kalman.x.len());
+                output.clear(axis.kalman.x.len(), axis.channels.len());
             }
             let values = block.values.get(column).map_or(&[][..], Vec::as_slice);
-            for ((z, missing), time) in values.iter().zip(&block.missing).zip(&block.time_s) {
-                let update = axis.step(*z, *missing, *time);
+            for (row, ((z, missing), time)) in values.iter().zip(&block.missing).zip(&block.time_s).enumerate() {
+                axis.step(*z, *missing, *time, aids.iter().map(|aid| aid.get(row).copied().unwrap_or(f64::NAN)));
                 if let Some(output) = &mut output {
-                    output.push(&axis.kalman, update);
+                    output.push(axis);
                 }
             }
         }
@@ -338,153 +357,32 @@ impl Replayer {
     }
 }
 
-impl AxisReplay {
-    fn new(design: &AxisDesign, gate: Option<f64>) -> AxisReplay {
-        let model = &design.model;
-        let settling = design.steady_state.settling_time / model.dt;
-        let gain = (model.h.row(0) * design.steady_state.gain.column(0))[0];
-        AxisReplay {
-            kalman: Kalman::new(model),
-            every: model.every.first().copied().unwrap_or(1).max(1) as u64,
-            drift: model.drift_row().iter().copied().collect(),
-            gate,
-            step: 0,
-            started: false,
-            start: StartTest::new(model, settling),
-            autocorrelation: Autocorrelation::new(LAGS),
-            low_frequency: LowFrequency::new(&time_constants(&design.steady_state.poles), gain),
-            log_likelihood: Sum::default(),
-            samples: 0,
-            unusable: 0,
-            gaps: 0,
-            missing: 0,
-            rejected: 0,
-            trace: Trace::new(),
-            nis_histogram: [0; NIS_BINS],
-        }
-    }
-
-    /// One sample; `None` when there was no usable measurement.
-    fn step(&mut self, z: f64, missing: u64, time_s: f64) -> Option<Update> {
-        self.samples += 1;
-        if self.started {
-            self.advance(missing);
-        }
-        self.started = true;
-        if !self.step.is_multiple_of(self.every) {
-            return None;
-        }
-        if !z.is_finite() {
-            self.unusable += 1;
-            self.autocorrelation.skip(1);
-            return None;
-        }
-        let update = self.kalman.update(0, z, self.gate);
-        let y = update.innovation / update.variance.sqrt();
-        if !update.accepted {
-            if self.gate.is_some_and(|gate| y.abs() > gate) {
-                self.rejected += 1;
-            } else {
-                self.unusable += 1;
-            }
-            self.autocorrelation.skip(1);
-            return Some(update);
-        }
-        self.start.update(self.step, z, &update);
-        self.log_likelihood.add(update.log_likelihood);
-        self.autocorrelation.push(y);
-        self.low_frequency.push(y);
-        let (estimate, sigma) = self.output();
-        self.trace.push(time_s, z, estimate, sigma, y);
-        self.nis_histogram[((2.0 * update.nis) as usize).min(NIS_BINS - 1)] += 1;
-        Some(update)
-    }
-
-    /// Predictions to the next sample, with `missing` samples in between.
-    fn advance(&mut self, missing: u64) {
-        let steps = missing.saturating_add(1);
-        if missing == 0 {
-            self.kalman.predict();
-        } else {
-            self.gaps += 1;
-            self.missing = self.missing.saturating_add(missing);
-            self.kalman.predict_many(steps);
-            self.autocorrelation.skip(missing / self.every);
-        }
-        self.start.predict(steps);
-        self.step = self.step.saturating_add(steps);
-    }
-
-    /// d x and √(d P dᵀ), d the row of the whole drift.
-    fn output(&self) -> (f64, f64) {
-        let (x, p) = (&self.kalman.x, &self.kalman.p);
-        let (mut mean, mut variance) = (0.0, 0.0);
-        for (i, di) in self.drift.iter().enumerate() {
-            mean += di * x[i];
-            for (j, dj) in self.drift.iter().enumerate() {
-                variance += di * dj * p[(i, j)];
-            }
-        }
-        (mean, variance.max(0.0).sqrt())
-    }
-}
-
-impl StartTest {
-    fn new(model: &crate::model::LinearModel, settling: f64) -> StartTest {
-        let direction = &model.p0 * model.h.row(0).transpose();
-        let size = (model.h.row(0) * &direction)[0].sqrt();
-        let shifted = (size.is_finite() && size > 0.0).then(|| {
-            let mut kalman = Kalman::new(model);
-            kalman.x += direction / size;
-            kalman
-        });
-        // a filter that never settles is watched for as long as a float counts exactly
-        let until = if settling.is_finite() { settling.clamp(1.0, 1e9) as u64 } else { 1_000_000_000 };
-        StartTest { shifted, until, score: 0.0, information: 0.0 }
-    }
-
-    fn predict(&mut self, steps: u64) {
-        if let Some(kalman) = &mut self.shifted {
-            match steps {
-                1 => kalman.predict(),
-                n => kalman.predict_many(n),
-            }
-        }
-    }
-
-    /// The same measurement that the filter accepted.
-    fn update(&mut self, step: u64, z: f64, update: &Update) {
-        let Some(kalman) = &mut self.shifted else { return };
-        // ν of the shifted filter is ν − d
-        let difference = update.innovation - kalman.update(0, z, None).innovation;
-        self.score += difference * update.innovation / update.variance;
-        self.information += difference * difference / update.variance;
-        if step >= self.until {
-            self.shifted = None;
-        }
-    }
-}
-
 impl AxisEstimates {
-    fn clear(&mut self, states: usize) {
+    fn clear(&mut self, states: usize, measurements: usize) {
         for columns in [&mut self.states, &mut self.sigmas] {
             columns.resize_with(states, Vec::new);
             columns.iter_mut().for_each(Vec::clear);
         }
-        for column in [&mut self.innovation, &mut self.innovation_sigma, &mut self.nis] {
-            column.clear();
+        self.updates.resize_with(measurements, UpdateEstimates::default);
+        for update in &mut self.updates {
+            for column in [&mut update.innovation, &mut update.innovation_sigma, &mut update.nis] {
+                column.clear();
+            }
         }
     }
 
-    fn push(&mut self, kalman: &Kalman, update: Option<Update>) {
+    fn push(&mut self, axis: &AxisReplay) {
+        let kalman = &axis.kalman;
         for (i, (states, sigmas)) in self.states.iter_mut().zip(&mut self.sigmas).enumerate() {
             states.push(kalman.x[i]);
             sigmas.push(kalman.p[(i, i)].max(0.0).sqrt());
         }
-        let (innovation, sigma, nis) =
-            update.map_or((f64::NAN, f64::NAN, f64::NAN), |u| (u.innovation, u.variance.sqrt(), u.nis));
-        self.innovation.push(innovation);
-        self.innovation_sigma.push(sigma);
-        self.nis.push(nis);
+        for (update, channel) in self.updates.iter_mut().zip(&axis.channels) {
+            let (innovation, sigma, nis) =
+                channel.last.map_or((f64::NAN, f64::NAN, f64::NAN), |u| (u.innovation, u.variance.sqrt(), u.nis));
+            update.innovation.push(innovation);
+            update.innovation_sigma.push(sigma);
+            update.nis.push(nis);
+        }
     }
 }

@@ -6,10 +6,8 @@
 //! low-frequency spectrum) and, behind a gate, `rejected`. Holm's adjustment runs over all tests and axes;
 //! [`effect::judge`] states how p-values and effect sizes make the verdict.
 
-use super::{
-    AxisReplay, AxisResult, FinalState, LowFrequencySummary, Nis, ReplayResult, Replayer, Sight, Start,
-    WhitenessSummary,
-};
+use super::axis::{AxisReplay, Channel, of_row};
+use super::{AxisResult, FinalState, LowFrequencySummary, Nis, ReplayResult, Replayer, Sight, Start, WhitenessSummary};
 use crate::consistency::effect::{self, Effect};
 use crate::consistency::normalized::{gated_moments, moment_matched};
 use crate::consistency::whiteness::Whiteness;
@@ -30,12 +28,15 @@ pub(super) fn conclude(replayer: Replayer) -> ReplayResult {
     let mut results = Vec::new();
     let mut short = Vec::new();
     for ((axis, design), log_axis) in axes.into_iter().zip(&design.axes).zip(log_axes) {
-        if let Some(reason) = too_short(&axis, design) {
-            short.push(reason);
+        for (index, channel) in axis.channels.iter().enumerate() {
+            let view = View { axis: &axis, channel, design, index };
+            if let Some(reason) = view.too_short() {
+                short.push(reason);
+            }
+            let (result, its_tests) = axis_result(&view, log_axis.clone(), options.alpha, options.gate);
+            results.push(result);
+            tests.extend(its_tests);
         }
-        let (result, its_tests) = axis_result(axis, design, log_axis, options.alpha);
-        results.push(result);
-        tests.extend(its_tests);
     }
     let verdict = effect::judge(&mut tests, options.alpha, short.is_empty());
     ReplayResult {
@@ -53,63 +54,91 @@ pub(super) fn conclude(replayer: Replayer) -> ReplayResult {
     }
 }
 
-/// Why this axis cannot be judged, if so.
-fn too_short(axis: &AxisReplay, design: &AxisDesign) -> Option<String> {
-    let accepted = axis.autocorrelation.count();
-    if axis.low_frequency.is_enough() && accepted >= FEWEST_SAMPLES {
-        return None;
-    }
-    if accepted < axis.samples / 2 {
-        return Some(format!("{}: only {accepted} of {} samples were accepted", design.name, axis.samples));
-    }
-    let needed = axis.low_frequency.samples_needed().saturating_mul(axis.every);
-    Some(format!(
-        "{}: {accepted} accepted samples are too few to judge the drift, {needed} are needed ({} s)",
-        design.name,
-        digits(needed as f64 * design.model.dt)
-    ))
+/// One measurement of an axis.
+struct View<'a> {
+    axis: &'a AxisReplay,
+    channel: &'a Channel,
+    design: &'a AxisDesign,
+    index: usize,
 }
 
-fn axis_result(axis: AxisReplay, design: &AxisDesign, log_axis: String, alpha: f64) -> (AxisResult, Vec<Test>) {
-    let name = design.name.as_str();
-    let dt = design.model.dt * axis.every as f64;
-    let sums = &axis.autocorrelation;
+impl View<'_> {
+    /// The axis, and the measurement where there are several.
+    fn name(&self) -> String {
+        let (name, measurements) = (&self.design.name, &self.design.model.measurements);
+        if measurements.len() == 1 { name.clone() } else { format!("{name}.{}", measurements[self.index].name) }
+    }
+
+    /// Rows at which the filter expects this measurement.
+    fn expected(&self) -> u64 {
+        self.axis.samples.div_ceil(self.channel.every)
+    }
+
+    /// Why this cannot be judged, if so.
+    fn too_short(&self) -> Option<String> {
+        let (channel, name) = (self.channel, self.name());
+        let accepted = channel.autocorrelation.count();
+        if channel.low_frequency.is_enough() && accepted >= FEWEST_SAMPLES {
+            return None;
+        }
+        let expected = self.expected();
+        if accepted < expected / 2 {
+            return Some(format!("{name}: only {accepted} of {expected} samples were accepted"));
+        }
+        let needed = channel.low_frequency.samples_needed().saturating_mul(channel.every);
+        Some(format!(
+            "{name}: {accepted} accepted samples are too few to judge the drift, {needed} are needed ({} s)",
+            digits(needed as f64 * self.design.model.dt)
+        ))
+    }
+}
+
+fn axis_result(view: &View<'_>, log_axis: String, alpha: f64, gate: Option<f64>) -> (AxisResult, Vec<Test>) {
+    let View { axis, channel, design, index } = *view;
+    let name = view.name();
+    let name = name.as_str();
+    let dt = design.model.dt * channel.every as f64;
+    let sums = &channel.autocorrelation;
     let accepted = sums.count();
     let mut result = AxisResult {
         name: name.to_string(),
+        axis: design.name.clone(),
+        of_plant: !design.model.outputs.is_empty(),
+        measurement: design.model.measurements[index].name.clone(),
+        unit: design.model.measurements[index].unit.clone(),
         log_axis,
         samples: axis.samples,
         accepted,
-        unusable: axis.unusable,
+        unusable: axis.unusable + channel.unusable,
         gaps: axis.gaps,
         missing: axis.missing,
-        rejected: axis.rejected,
-        log_likelihood: axis.log_likelihood.value(),
-        final_output: final_output(&axis, design),
-        final_state: final_state(&axis, design),
+        rejected: channel.rejected,
+        log_likelihood: channel.log_likelihood.value(),
+        final_output: final_output(axis, design),
+        final_state: final_state(axis, design),
         nis: None,
         whiteness: None,
         low_frequency: Vec::new(),
         start: None,
         sight: Sight {
-            trace: axis.trace.points().to_vec(),
-            samples_per_point: axis.trace.samples_per_point(),
-            nis_histogram: axis.nis_histogram.to_vec(),
+            trace: channel.trace.points().to_vec(),
+            samples_per_point: channel.trace.samples_per_point(),
+            nis_histogram: channel.nis_histogram.to_vec(),
             ..Sight::default()
         },
     };
     let mut tests = Vec::new();
-    if accepted + axis.rejected < FEWEST_SAMPLES {
+    if accepted + channel.rejected < FEWEST_SAMPLES {
         return (result, tests);
     }
-    let (expected, variance) = axis.gate.map_or((1.0, 2.0), gated_moments);
-    if let Some(gate) = axis.gate {
-        tests.push(rejected_test(name, gate, axis.rejected, accepted, alpha));
+    let (expected, variance) = gate.map_or((1.0, 2.0), gated_moments);
+    if let Some(gate) = gate {
+        tests.push(rejected_test(name, gate, channel.rejected, accepted, alpha));
     }
     if accepted < FEWEST_SAMPLES {
         return (result, tests);
     }
-    if axis.start.information > 0.0 {
+    if index == 0 && axis.start.information > 0.0 {
         let (start, test) = start_test(name, axis.start.score, axis.start.information, alpha);
         result.start = Some(start);
         tests.push(test);
@@ -119,7 +148,7 @@ fn axis_result(axis: AxisReplay, design: &AxisDesign, log_axis: String, alpha: f
     tests.push(nis.nis(name, nis_error(sums.squares(), sums.fourth(), &whiteness), alpha));
     result.nis = Some(Nis { mean: nis.mean, expected, lower: nis.lower, upper: nis.upper, p_value: nis.p_value });
     tests.extend(whiteness.tests(name, dt, alpha));
-    for block in axis.low_frequency.results(expected, alpha) {
+    for block in channel.low_frequency.results(expected, alpha) {
         tests.push(block.test(name, dt));
         result.low_frequency.push(LowFrequencySummary {
             block_s: block.length as f64 * dt,
@@ -132,7 +161,7 @@ fn axis_result(axis: AxisReplay, design: &AxisDesign, log_axis: String, alpha: f
             detects: block.detects,
         });
     }
-    if let Some((length, periodogram)) = axis.low_frequency.periodogram(alpha) {
+    if let Some((length, periodogram)) = channel.low_frequency.periodogram(alpha) {
         let interval_s = length as f64 * dt;
         tests.push(periodogram.test(name, interval_s));
         let blocks = 2 * periodogram.ordinates + 1;
@@ -160,10 +189,18 @@ fn thinned(values: &[f64]) -> impl Iterator<Item = (usize, f64)> + '_ {
     values.iter().copied().enumerate().step_by(step)
 }
 
+/// The first output of a plant, else the whole drift.
 fn final_output(axis: &AxisReplay, design: &AxisDesign) -> FinalState {
-    let (value, sigma) = axis.output();
-    let measurement = design.model.measurements.first();
-    let (name, unit) = measurement.map(|m| (m.name.clone(), m.unit.clone())).unwrap_or_default();
+    let model = &design.model;
+    let (named, row) = match model.outputs.first() {
+        Some(output) => (Some((output.name.clone(), output.unit.clone())), output.row.clone()),
+        None => {
+            let measured = model.measurements.first().map(|m| (m.name.clone(), m.unit.clone()));
+            (measured, model.drift_row().iter().copied().collect())
+        }
+    };
+    let (name, unit) = named.unwrap_or_default();
+    let (value, sigma) = of_row(&axis.kalman, &row);
     FinalState { name, unit, value, sigma }
 }
 

@@ -64,7 +64,7 @@ fn figures(result: &ReplayResult, axis: &AxisResult, unit: Option<&Unit>) -> Vec
     if sight.trace.is_empty() {
         return Vec::new();
     }
-    let si = result.quantity.si_unit();
+    let si = axis.unit.as_str();
     let shown = |value: f64| in_log_unit(value, 0.0, si, result.quantity, unit).0;
     let time_s: Vec<f64> = sight.trace.iter().map(|p| p.time_s).collect();
     let averaged: Vec<f64> = sight.trace.iter().map(|p| p.innovation).collect();
@@ -72,7 +72,7 @@ fn figures(result: &ReplayResult, axis: &AxisResult, unit: Option<&Unit>) -> Vec
     let level = digits(100.0 * (1.0 - result.alpha));
     let estimate = figure::estimate(&figure::Estimate {
         title: format!("{}: estimate", axis.name),
-        quantity: format!("bias of {}", axis.name),
+        quantity: if axis.of_plant { axis.measurement.clone() } else { format!("bias of {}", axis.name) },
         unit: in_log_unit(0.0, 0.0, si, result.quantity, unit).2,
         time_s: time_s.clone(),
         estimate: sight.trace.iter().map(|p| shown(p.estimate)).collect(),
@@ -83,7 +83,11 @@ fn figures(result: &ReplayResult, axis: &AxisResult, unit: Option<&Unit>) -> Vec
             points: sight.trace.iter().map(|p| (p.time_s, shown(p.measured))).collect(),
         }),
     });
-    let mut figures = vec![(estimate, "The filter's estimate of what a sensor at rest shows.".to_string())];
+    let caption = match axis.of_plant {
+        true => "The filter's estimate of what is measured, with the sigma of the estimate.",
+        false => "The filter's estimate of what a sensor at rest shows.",
+    };
+    let mut figures = vec![(estimate, caption.to_string())];
     figures.push((
         figure::innovations(&figure::Innovations {
             title: format!("{}: innovations", axis.name),

@@ -1,7 +1,7 @@
 //! A design as a person reads it.
 
 use super::{Truth, truth};
-use crate::cli::output::{digits, table};
+use crate::cli::output::{digits, shown_unit, table};
 use crate::consistency::Verdict;
 use crate::filter::AxisDesign;
 use crate::model::LinearModel;
@@ -66,20 +66,6 @@ pub(super) fn title(names: &[&str]) -> String {
 /// A state's own unit, see [`shown_unit`].
 pub(super) fn shown(model: &LinearModel, state: usize, quantity: Quantity, unit: &Unit) -> (f64, String) {
     shown_unit(&model.states[state].unit, quantity, unit)
-}
-
-/// That of the quantity is shown in the unit of the axis, its integral and its derivative (an angle, an acceleration) in the unit that
-/// goes with it, others in SI: scale and text.
-pub(super) fn shown_unit(si: &str, quantity: Quantity, unit: &Unit) -> (f64, String) {
-    if si == quantity.si_unit() {
-        return (unit.scale(), unit.to_string());
-    }
-    let dimension = Unit::parse(si).map(|si| si.dimension());
-    let family = [2, -2].map(|half_powers| unit.times_time(half_powers));
-    match family.into_iter().find(|unit| dimension == Ok(unit.dimension())) {
-        Some(unit) => (unit.scale(), unit.to_string()),
-        None => (1.0, si.to_owned()),
-    }
 }
 
 /// Columns of the table of states; a gain per measurement.

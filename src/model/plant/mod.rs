@@ -1,7 +1,7 @@
 //! What is measured beside the sensor's own errors: the plant. One file per plant.
 //!
 //! A plant is x_{k+1} = F x_k + G u_k + v, y_k = H x_k with named states, inputs and outputs. A sensor is joined to an input
-//! (the filter integrates what it measures) or to an output (the filter compares what it measures) by [`augment`](super::augment).
+//! (the filter integrates what it measures) or to an output (the filter compares what it measures) by [`augment`](super::augment()).
 
 pub mod angle;
 pub mod custom;

@@ -1,0 +1,263 @@
+//! One axis in progress: the filter, its input and its measurements.
+
+use nalgebra::DVector;
+
+use super::trace::Trace;
+use super::{LAGS, NIS_BINS, sensors};
+use crate::consistency::low_frequency::{LowFrequency, time_constants};
+use crate::consistency::whiteness::Autocorrelation;
+use crate::filter::AxisDesign;
+use crate::filter::kalman::{Kalman, Update};
+use crate::model::LinearModel;
+use crate::numerics::reduce::Sum;
+
+/// Over a gap of more samples an input is not held.
+const LONGEST_HELD: u64 = 1_000_000;
+
+/// One axis in progress.
+#[derive(Clone, Debug)]
+pub(super) struct AxisReplay {
+    pub(super) kalman: Kalman,
+    /// Last usable value of the sensor, where the filter integrates it.
+    input: Option<f64>,
+    pub(super) channels: Vec<Channel>,
+    /// Measurements of the sensor itself; those after it are aids.
+    own: usize,
+    gate: Option<f64>,
+    /// Steps since the first sample.
+    step: u64,
+    started: bool,
+    pub(super) start: StartTest,
+    pub(super) samples: u64,
+    /// Samples of an input that are not numbers.
+    pub(super) unusable: u64,
+    pub(super) gaps: u64,
+    pub(super) missing: u64,
+}
+
+/// One measurement in progress.
+#[derive(Clone, Debug)]
+pub(super) struct Channel {
+    pub(super) every: u64,
+    /// Of the estimate that figures show beside the measurement.
+    row: Vec<f64>,
+    /// An angle is measured modulo a turn.
+    angle: bool,
+    /// H, for the nearest turn.
+    h: DVector<f64>,
+    /// The update of this sample.
+    pub(super) last: Option<Update>,
+    pub(super) autocorrelation: Autocorrelation,
+    pub(super) low_frequency: LowFrequency,
+    pub(super) log_likelihood: Sum,
+    pub(super) unusable: u64,
+    pub(super) rejected: u64,
+    pub(super) trace: Trace,
+    pub(super) nis_histogram: [u64; NIS_BINS],
+}
+
+/// The score test of x0: a second filter, shifted at the start by one standard deviation of P0 in the direction that the first
+/// measurement sees, shows how innovations answer to such a shift; they are projected on that answer.
+#[derive(Clone, Debug)]
+pub(super) struct StartTest {
+    shifted: Option<Kalman>,
+    /// Steps after which the answer has died away.
+    until: u64,
+    /// Σ d ν/S and Σ d²/S, d = difference of the innovations.
+    pub(super) score: f64,
+    pub(super) information: f64,
+}
+
+impl AxisReplay {
+    pub(super) fn new(design: &AxisDesign, gate: Option<f64>) -> AxisReplay {
+        let model = &design.model;
+        let settling = design.steady_state.settling_time / model.dt;
+        AxisReplay {
+            kalman: Kalman::new(model),
+            input: None,
+            channels: (0..model.measurements.len()).map(|i| Channel::new(design, i)).collect(),
+            own: sensors(model),
+            gate,
+            step: 0,
+            started: false,
+            start: StartTest::new(model, settling),
+            samples: 0,
+            unusable: 0,
+            gaps: 0,
+            missing: 0,
+        }
+    }
+
+    /// Measurements that are not of the sensor.
+    pub(super) fn aids(&self) -> usize {
+        self.channels.len() - self.own
+    }
+
+    /// One row: the sensor's value, the samples missing before it, and one value per aid.
+    pub(super) fn step(&mut self, sensor: f64, missing: u64, time_s: f64, aids: impl Iterator<Item = f64>) {
+        self.samples += 1;
+        if self.started {
+            self.advance(missing);
+        }
+        self.started = true;
+        self.channels.iter_mut().for_each(|channel| channel.last = None);
+        if self.own == 1 {
+            // taken at every n-th sample, and a value that is no number is a fault
+            if self.step.is_multiple_of(self.channels[0].every) {
+                if sensor.is_finite() { self.update(0, sensor, time_s) } else { self.channels[0].skip() }
+            }
+        } else if sensor.is_finite() {
+            self.input = Some(sensor);
+        } else {
+            self.unusable += 1;
+        }
+        for (index, z) in (self.own..).zip(aids) {
+            if z.is_finite() {
+                self.update(index, z, time_s);
+            }
+        }
+    }
+
+    fn update(&mut self, index: usize, z: f64, time_s: f64) {
+        let channel = &mut self.channels[index];
+        let z = channel.nearest(z, &self.kalman.x);
+        let update = self.kalman.update(index, z, self.gate);
+        channel.last = Some(update);
+        let y = update.innovation / update.variance.sqrt();
+        if !update.accepted {
+            if self.gate.is_some_and(|gate| y.abs() > gate) {
+                channel.rejected += 1;
+                channel.autocorrelation.skip(1);
+            } else {
+                channel.skip();
+            }
+            return;
+        }
+        self.start.update(self.step, index, z, &update);
+        channel.log_likelihood.add(update.log_likelihood);
+        channel.autocorrelation.push(y);
+        channel.low_frequency.push(y);
+        let (estimate, sigma) = of_row(&self.kalman, &channel.row);
+        channel.trace.push(time_s, z, estimate, sigma, y);
+        channel.nis_histogram[((2.0 * update.nis) as usize).min(NIS_BINS - 1)] += 1;
+    }
+
+    /// Predictions to the next sample, with `missing` samples in between.
+    fn advance(&mut self, missing: u64) {
+        let steps = missing.saturating_add(1);
+        advance(&mut self.kalman, steps, self.input);
+        self.start.predict(steps, self.input);
+        if missing > 0 {
+            self.gaps += 1;
+            self.missing = self.missing.saturating_add(missing);
+            for channel in &mut self.channels[..self.own] {
+                channel.autocorrelation.skip(missing / channel.every);
+            }
+        }
+        self.step = self.step.saturating_add(steps);
+    }
+}
+
+/// So many predictions; an input keeps its value.
+fn advance(kalman: &mut Kalman, steps: u64, input: Option<f64>) {
+    match (steps, input) {
+        (1, None) => kalman.predict(),
+        // a gap so long has lost an integrated angle whatever the input was
+        (steps, None) | (steps @ LONGEST_HELD.., Some(_)) => kalman.predict_many(steps),
+        (steps, Some(u)) => {
+            for _ in 0..steps {
+                kalman.predict();
+                kalman.drive(&[u]);
+            }
+        }
+    }
+}
+
+/// d x and √(d P dᵀ).
+pub(super) fn of_row(kalman: &Kalman, row: &[f64]) -> (f64, f64) {
+    let (x, p) = (&kalman.x, &kalman.p);
+    let (mut mean, mut variance) = (0.0, 0.0);
+    for (i, di) in row.iter().enumerate() {
+        mean += di * x[i];
+        for (j, dj) in row.iter().enumerate() {
+            variance += di * dj * p[(i, j)];
+        }
+    }
+    (mean, variance.max(0.0).sqrt())
+}
+
+impl Channel {
+    fn new(design: &AxisDesign, index: usize) -> Channel {
+        let model = &design.model;
+        let every = model.every[index].max(1) as u64;
+        let h = model.h.row(index);
+        let row = if model.outputs.is_empty() {
+            model.drift_row().iter().copied().collect()
+        } else {
+            h.iter().copied().collect()
+        };
+        let constants: Vec<f64> =
+            time_constants(&design.steady_state.poles).into_iter().map(|samples| samples / every as f64).collect();
+        Channel {
+            every,
+            row,
+            angle: model.measurements[index].unit == "rad",
+            h: h.transpose(),
+            last: None,
+            autocorrelation: Autocorrelation::new(LAGS),
+            low_frequency: LowFrequency::new(&constants, (h * design.steady_state.gain.column(index))[0]),
+            log_likelihood: Sum::default(),
+            unusable: 0,
+            rejected: 0,
+            trace: Trace::new(),
+            nis_histogram: [0; NIS_BINS],
+        }
+    }
+
+    /// A measured angle, by whole turns nearest to what the filter expects.
+    fn nearest(&self, z: f64, x: &DVector<f64>) -> f64 {
+        if !self.angle {
+            return z;
+        }
+        let turns = ((z - self.h.dot(x)) / std::f64::consts::TAU).round();
+        if turns == 0.0 { z } else { z - turns * std::f64::consts::TAU }
+    }
+
+    fn skip(&mut self) {
+        self.unusable += 1;
+        self.autocorrelation.skip(1);
+    }
+}
+
+impl StartTest {
+    fn new(model: &LinearModel, settling: f64) -> StartTest {
+        let direction = &model.p0 * model.h.row(0).transpose();
+        let size = (model.h.row(0) * &direction)[0].sqrt();
+        let shifted = (size.is_finite() && size > 0.0).then(|| {
+            let mut kalman = Kalman::new(model);
+            kalman.x += direction / size;
+            kalman
+        });
+        // a filter that never settles is watched for as long as a float counts exactly
+        let until = if settling.is_finite() { settling.clamp(1.0, 1e9) as u64 } else { 1_000_000_000 };
+        StartTest { shifted, until, score: 0.0, information: 0.0 }
+    }
+
+    fn predict(&mut self, steps: u64, input: Option<f64>) {
+        if let Some(kalman) = &mut self.shifted {
+            advance(kalman, steps, input);
+        }
+    }
+
+    /// The same measurement that the filter accepted.
+    fn update(&mut self, step: u64, index: usize, z: f64, update: &Update) {
+        let Some(kalman) = &mut self.shifted else { return };
+        // ν of the shifted filter is ν − d
+        let difference = update.innovation - kalman.update(index, z, None).innovation;
+        self.score += difference * update.innovation / update.variance;
+        self.information += difference * difference / update.variance;
+        if step >= self.until {
+            self.shifted = None;
+        }
+    }
+}

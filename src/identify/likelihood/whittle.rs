@@ -6,7 +6,7 @@
 //! inverse is the Cramér-Rao bound.
 //! Sources: Whittle 1953; Kay 1993, section 3.11 (asymptotic bound).
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use slsqp::{Func, StopTols, minimize};
 
 use super::super::shape::Role;
@@ -22,8 +22,8 @@ const SHORTEST_DRIFT: f64 = 2.0;
 const LONGEST: f64 = 10.0;
 /// A maximum is found when another step would gain half of this in ln L.
 pub(super) const WELL: f64 = 1e-2;
-/// Steps of the scoring at most.
-const SCORINGS: usize = 60;
+/// What a step may be, in logarithms: where the log says next to nothing, the parabola reaches further than it is true.
+const REACH: f64 = 2.0;
 /// Step of numerical derivatives by a logarithm.
 const STEP: f64 = 1e-4;
 
@@ -36,7 +36,7 @@ pub(super) struct Fit {
     pub(super) slope: f64,
     /// Of the coefficients: all that n samples say apart from their mean.
     pub(super) log_likelihood: f64,
-    /// gᵀ I⁻¹ g: what another step would still gain, twice, in log-likelihood.
+    /// gᵀ (I + 1/reach²)⁻¹ g: what another step would still gain, twice, in log-likelihood.
     pub(super) decrement: f64,
 }
 
@@ -137,14 +137,18 @@ fn slope(data: &Ordinates, form: &Form, total: &[f64]) -> (f64, f64) {
 
 /// −ln L, and its gradient.
 fn objective(data: &Ordinates, form: &Form, logs: &[f64], held: &Held, gradient: Option<&mut [f64]>) -> f64 {
-    let Spectrum { total, derivatives } = spectrum(data, form, logs, held, gradient.is_some());
-    let (slope, _) = slope(data, form, &total);
+    objective_of(data, form, &spectrum(data, form, logs, held, gradient.is_some()), gradient)
+}
+
+fn objective_of(data: &Ordinates, form: &Form, spectrum: &Spectrum, gradient: Option<&mut [f64]>) -> f64 {
+    let Spectrum { total, derivatives } = spectrum;
+    let (slope, _) = slope(data, form, total);
     let constant = (std::f64::consts::TAU / data.dt).ln();
     let sum: f64 =
-        data.bins.iter().zip(&total).map(|(bin, s)| bin.count * (constant + s.ln()) + bin.left(slope) / s).sum();
+        data.bins.iter().zip(total).map(|(bin, s)| bin.count * (constant + s.ln()) + bin.left(slope) / s).sum();
     if let Some(gradient) = gradient {
-        for (g, derivative) in gradient.iter_mut().zip(&derivatives) {
-            let terms = data.bins.iter().zip(&total).zip(derivative);
+        for (g, derivative) in gradient.iter_mut().zip(derivatives) {
+            let terms = data.bins.iter().zip(total).zip(derivative);
             *g = 0.5 * terms.map(|((bin, s), d)| (bin.count - bin.left(slope) / s) * d / s).sum::<f64>();
         }
     }
@@ -156,11 +160,14 @@ pub(super) fn expected_information(data: &Ordinates, form: &Form, logs: &[f64]) 
     information(data, form, logs, &Held::nothing(data, form))
 }
 
-/// Rows of held pieces are zero.
 fn information(data: &Ordinates, form: &Form, logs: &[f64], held: &Held) -> DMatrix<f64> {
-    let Spectrum { total, derivatives } = spectrum(data, form, logs, held, true);
+    information_of(data, &spectrum(data, form, logs, held, true))
+}
+
+/// Rows of held pieces are zero.
+fn information_of(data: &Ordinates, Spectrum { total, derivatives }: &Spectrum) -> DMatrix<f64> {
     let p = derivatives.len();
-    let weights: Vec<f64> = data.bins.iter().zip(&total).map(|(bin, s)| 0.5 * bin.count / (s * s)).collect();
+    let weights: Vec<f64> = data.bins.iter().zip(total).map(|(bin, s)| 0.5 * bin.count / (s * s)).collect();
     let mut information = DMatrix::zeros(p, p);
     for i in 0..p {
         for k in 0..=i {
@@ -317,42 +324,7 @@ pub(super) fn climb(data: &Ordinates, form: &Form, start: &[f64], free: &[usize]
             break;
         }
     }
-    let found = finish(data, form, at, best, free, &bounds);
-    best.is_finite().then(|| if found.decrement > WELL { scored(data, found, free, &bounds) } else { found })
-}
-
-/// Carried on by Fisher's scoring with damping (Marquardt 1963), for overlapping lines, of which SLSQP's picture of the curvature is too poor.
-fn scored(data: &Ordinates, start: Fit, free: &[usize], bounds: &[(f64, f64)]) -> Fit {
-    let mut best = start;
-    let mut damping = 1e-3;
-    for _ in 0..SCORINGS {
-        let held = Held::new(data, &best.form, &best.logs, free);
-        let mut gradient = vec![0.0; best.logs.len()];
-        objective(data, &best.form, &best.logs, &held, Some(&mut gradient));
-        let information = information(data, &best.form, &best.logs, &held);
-        let damped = DMatrix::from_fn(free.len(), free.len(), |i, k| {
-            information[(free[i], free[k])] * if i == k { 1.0 + damping } else { 1.0 }
-        });
-        let g = DVector::from_iterator(free.len(), free.iter().map(|i| -gradient[*i]));
-        let Some(step) = nalgebra::Cholesky::new(damped).map(|c| c.solve(&g)) else { break };
-        let mut logs = best.logs.clone();
-        for (i, by) in free.iter().zip(step.iter()) {
-            logs[*i] = (logs[*i] + by).clamp(bounds[*i].0, bounds[*i].1);
-        }
-        let value = objective(data, &best.form, &logs, &held, None);
-        if value < -best.log_likelihood {
-            best = finish(data, &best.form, logs, value, free, bounds);
-            damping /= 10.0;
-            if best.decrement < WELL {
-                break;
-            }
-        } else if damping > 1e6 {
-            break;
-        } else {
-            damping *= 10.0;
-        }
-    }
-    best
+    best.is_finite().then(|| finish(data, form, at, best, free, &bounds))
 }
 
 /// The same by all logarithms.
@@ -362,16 +334,18 @@ pub(super) fn climb_all(data: &Ordinates, form: &Form, start: &[f64]) -> Option<
 
 fn finish(data: &Ordinates, form: &Form, logs: Vec<f64>, value: f64, free: &[usize], bounds: &[(f64, f64)]) -> Fit {
     let held = Held::new(data, form, &logs, free);
+    let spectrum = spectrum(data, form, &logs, &held, true);
     let mut gradient = vec![0.0; logs.len()];
-    objective(data, form, &logs, &held, Some(&mut gradient));
+    objective_of(data, form, &spectrum, Some(&mut gradient));
     // at a bound the gradient may point outwards
     let off = |i: &usize| logs[*i] > bounds[*i].0 + 1e-6 && logs[*i] < bounds[*i].1 - 1e-6;
     let inside: Vec<usize> = free.iter().copied().filter(off).collect();
-    let information = information(data, form, &logs, &held);
-    let part = DMatrix::from_fn(inside.len(), inside.len(), |i, k| information[(inside[i], inside[k])]);
+    let information = information_of(data, &spectrum);
+    let reach = DMatrix::from_diagonal_element(inside.len(), inside.len(), REACH.powi(-2));
+    let part = DMatrix::from_fn(inside.len(), inside.len(), |i, k| information[(inside[i], inside[k])]) + reach;
     let g = DMatrix::from_fn(inside.len(), 1, |i, _| gradient[inside[i]]);
     let decrement = nalgebra::Cholesky::new(part)
         .map_or(f64::NAN, |c| (g.transpose() * c.solve(&g)).get(0).copied().unwrap_or(0.0));
-    let (slope, _) = slope(data, form, &spectrum(data, form, &logs, &held, false).total);
+    let (slope, _) = slope(data, form, &spectrum.total);
     Fit { form: form.clone(), logs, slope, log_likelihood: -value, decrement }
 }

@@ -2,11 +2,12 @@
 
 use super::text::{self, Group, View, shown};
 use super::truth;
-use crate::cli::output::digits;
+use crate::cli::output::{digits, shown_unit};
 use crate::montecarlo::{AxisOutcome, Outcome};
 use crate::replay::ReplayResult;
 use crate::report::figure::{self, BudgetItem, Nees, Sigma, SigmaState};
 use crate::report::page::{Badge, Page, Section};
+use crate::tune::{PlantBudget, Share};
 use crate::units::Quantity;
 
 /// Predicted sigma of every axis, one below the other.
@@ -87,8 +88,21 @@ fn section(group: &Group<'_>, quantity: Quantity) -> Section {
     }
     let mut figures =
         vec![(sigma(group, quantity), "What the filter promises, from the first measurement on.".to_string())];
-    if !group.report.error_budget.is_empty() {
-        figures.push((budget(group), "Causes of the final variance of the drift estimate.".to_string()));
+    let report = group.report;
+    if !report.error_budget.is_empty() {
+        let title = format!("{}: error budget", group.title());
+        let svg = budget(&title, &report.error_budget, &shown_unit(quantity.si_unit(), quantity, &group.unit));
+        figures.push((svg, "Causes of the final variance of the drift estimate.".to_string()));
+    }
+    for (state, plant) in report.plant_budgets.iter().enumerate() {
+        let unit = shown_unit(&plant.unit, quantity, &group.unit);
+        if plant.unit != quantity.si_unit() {
+            let caption = format!("What the filter promises of the {}.", plant.state);
+            figures.push((plant_sigma(group, state, plant, &unit), caption));
+        }
+        let title = format!("{}: error budget of the {}", group.title(), plant.state);
+        let caption = format!("Causes of the final variance of the {}.", plant.state);
+        figures.push((budget(&title, &plant.error_budget, &unit), caption));
     }
     section.figures(figures).table(
         "Predicted sigma of the estimation errors",
@@ -140,16 +154,28 @@ fn nees(axis: &AxisOutcome, outcome: &Outcome) -> String {
     })
 }
 
-fn budget(group: &Group<'_>) -> String {
-    let items: Vec<BudgetItem> = group
-        .report
-        .error_budget
-        .iter()
-        .map(|share| BudgetItem {
-            source: share.source.clone(),
-            share: share.share,
-            value: format!("{} {}", digits(group.unit.from_si(share.variance_si.sqrt())), group.unit),
-        })
-        .collect();
-    figure::error_budget(&format!("{}: error budget", group.title()), &items)
+/// Predicted sigma of one state of the plant, which come first in the model.
+fn plant_sigma(group: &Group<'_>, state: usize, plant: &PlantBudget, (scale, unit): &(f64, String)) -> String {
+    let predicted = &group.report.predicted;
+    let variance: f64 = plant.error_budget.iter().map(|share| share.variance_si).sum();
+    figure::sigma(&Sigma {
+        title: format!("{}: predicted sigma of the {}", group.title(), plant.state),
+        unit: unit.clone(),
+        time_s: predicted.time_s.clone(),
+        states: vec![SigmaState {
+            name: plant.state.clone(),
+            sigma: predicted.sigma[state].iter().map(|sigma| sigma / scale).collect(),
+            steady: (variance > 0.0).then(|| variance.sqrt() / scale),
+        }],
+        settling_time_s: None,
+    })
+}
+
+fn budget(title: &str, shares: &[Share], (scale, unit): &(f64, String)) -> String {
+    let item = |share: &Share| BudgetItem {
+        source: share.source.clone(),
+        share: share.share,
+        value: format!("{} {unit}", digits(share.variance_si.sqrt() / scale)),
+    };
+    figure::error_budget(title, &shares.iter().map(item).collect::<Vec<_>>())
 }

@@ -17,7 +17,7 @@ const DT: f64 = 0.01;
 
 /// Ten minutes of the sensor with this true rate: measured and true rate, rad/s, and the true bias.
 fn flight(params: &Params, true_rate: TrueRate) -> (Vec<f64>, Vec<f64>, f64) {
-    let (seed, samples) = (11, 60_000);
+    let (seed, samples) = (12, 60_000);
     let scenario = Scenario {
         seed,
         run: 0,

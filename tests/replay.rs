@@ -346,6 +346,23 @@ fn right_designs_are_rarely_rejected() {
     assert!(counts[0] >= 440, "{counts:?}");
 }
 
+/// The same with a gap: 500 logs of 3000 samples at 10 Hz of which 100 are missing; bound 0.05 + 4.9 standard deviations (1e-6).
+#[test]
+fn gaps_reject_no_right_design() {
+    let right = skydog(0.1, 1.0, 1.0, 1.0);
+    let mut missing = vec![0; 2900];
+    missing[1199] = 100;
+    let rejected = |run: u64| {
+        let mut z = draw(&right, 1000 + run, 3000);
+        z.drain(1199..1299);
+        let mut replayer = Replayer::new(&right, &shape(&["x"], 10.0), Options { alpha: 0.05, gate: None }).unwrap();
+        replayer.push(&block(&z, &missing, 0.1, 0..2900), None);
+        replayer.finish().verdict == Verdict::Inconsistent
+    };
+    let rejected = (0..500).filter(|run| rejected(*run)).count() as f64;
+    assert!(rejected <= 500.0 * 0.05 + 4.9 * (500.0 * 0.05 * 0.95_f64).sqrt(), "{rejected}");
+}
+
 /// The start statistic is N(0, 1): 3000 logs of 60 samples, level 0.05; bound 4.9 standard deviations (1e-6).
 #[test]
 fn start_test_has_its_size() {
@@ -559,6 +576,42 @@ fn command_end_to_end() {
     assert!(short.stdout.contains("\ninconclusive: x: "), "{}", short.stdout);
 }
 
+/// `--smooth` over a gap and an outlier: the filtered columns are those of the plain output, to the bit; sigmas shrink, at the last sample nothing does.
+#[test]
+fn command_smooths() {
+    let bench = crate::support::Bench::new();
+    let right = skydog(0.1, 1.0, 1.0, 1.0);
+    let mut log = draw(&right, 5, 3000);
+    log[700] = 1e3;
+    bench.file("filter.json", right.to_json());
+    let text = log_text(&log, 0.1);
+    let lines: Vec<&str> =
+        text.lines().enumerate().filter(|(i, _)| !(1200..1300).contains(i)).map(|(_, l)| l).collect();
+    bench.file("log.csv", lines.join("\n") + "\n");
+    bench.ok("replay filter.json log.csv --gate 6 -o plain.csv");
+    let said = bench.ok("replay filter.json log.csv --gate 6 -o smooth.csv --smooth");
+    assert!(said.contains("\nx "), "{said}");
+    let rows = |name: &str| -> Vec<Vec<String>> {
+        bench.read(name).lines().map(|l| l.split(',').map(str::to_owned).collect()).collect()
+    };
+    let (plain, smooth) = (rows("plain.csv"), rows("smooth.csv"));
+    assert_eq!((plain.len(), smooth.len()), (2901, 2901));
+    assert_eq!(smooth[0][3..5], ["x_bias_smoothed (rad/s)", "x_bias_smoothed_sigma (rad/s)"]);
+    let (mut filtered, mut smoothed) = (0.0, 0.0);
+    for (a, b) in plain.iter().zip(&smooth) {
+        assert_eq!([&a[0], &a[1], &a[2], &a[3], &a[4]], [&b[0], &b[1], &b[2], &b[5], &b[6]]);
+    }
+    let number = |text: &String| text.parse::<f64>().unwrap();
+    for row in &smooth[1..] {
+        assert!(number(&row[8]) <= number(&row[6]) * (1.0 + 1e-12), "{row:?}");
+        filtered += number(&row[6]);
+        smoothed += number(&row[8]);
+    }
+    // far from the ends the drift is seen from both sides
+    assert!(smoothed < 0.95 * filtered, "{smoothed} {filtered}");
+    assert_eq!(smooth[2900][5], smooth[2900][7]);
+}
+
 /// What cannot be done: one line, exit 2, and no file left behind.
 #[test]
 fn command_refuses() {
@@ -577,6 +630,8 @@ fn command_refuses() {
         ("replay filter.json log.csv -o e.txt", "extension"),
         ("replay filter.json log.csv -o e.csv --plot nowhere/f.svg", "cannot write"),
         ("replay filter.json log.csv --innovations", "--output"),
+        ("replay filter.json log.csv --smooth", "--output"),
+        ("replay filter.json log.csv -o e.csv --smooth --innovations", "--innovations"),
         ("replay missing.json log.csv", "missing.json"),
         ("replay filter.json missing.csv", "missing.csv"),
     ];

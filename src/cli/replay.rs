@@ -37,6 +37,9 @@ pub struct Args {
     /// Add innovation, its sigma and NIS to the output
     #[arg(long, requires = "output")]
     innovations: bool,
+    /// Add the estimates of every sample from the whole log (Rauch-Tung-Striebel) and their sigmas to the output
+    #[arg(long, requires = "output", conflicts_with = "innovations")]
+    smooth: bool,
     /// Probability of a false alarm, over all tests together
     #[arg(long, default_value_t = 0.01, value_name = "P")]
     alpha: f64,
@@ -203,19 +206,37 @@ fn stream(
     reader: &mut LogReader,
 ) -> anyhow::Result<ReplayResult> {
     let mut writer = match &args.output {
-        Some(path) => Some(TableWriter::create(path, &header(design, args.innovations))?),
+        Some(path) => Some(TableWriter::create(path, &header(design, args.innovations, args.smooth))?),
         None => None,
     };
+    if args.smooth {
+        replayer.remember();
+    }
     let bar = progress(reader.check().samples, "replay");
-    let (mut block, mut estimates) = (Block::default(), Estimates::default());
+    let (mut block, mut estimates, mut time_s) = (Block::default(), Estimates::default(), Vec::new());
     while reader.next_block(&mut block)? {
-        replayer.push(&block, writer.is_some().then_some(&mut estimates));
-        if let Some(writer) = &mut writer {
+        let streamed = writer.as_mut().filter(|_| !args.smooth);
+        replayer.push(&block, streamed.is_some().then_some(&mut estimates));
+        if let Some(writer) = streamed {
             writer.write(&columns(&estimates, args.innovations))?;
+        }
+        if args.smooth {
+            time_s.extend_from_slice(&block.time_s);
         }
         bar.inc(block.time_s.len() as u64);
     }
     bar.finish_and_clear();
+    if let Some(writer) = writer.as_mut().filter(|_| args.smooth) {
+        let axes = replayer.smoothed();
+        let mut all = vec![time_s.as_slice()];
+        for axis in &axes {
+            for i in 0..axis.filtered.len() {
+                let of = [&axis.filtered, &axis.filtered_sigma, &axis.smoothed, &axis.smoothed_sigma];
+                all.extend(of.map(|columns| columns[i].as_slice()));
+            }
+        }
+        writer.write(&all)?;
+    }
     let result = replayer.finish();
     if let Some(writer) = writer {
         writer.finish()?;
@@ -223,12 +244,15 @@ fn stream(
     Ok(result)
 }
 
-fn header(design: &FilterDesign, innovations: bool) -> Vec<String> {
+fn header(design: &FilterDesign, innovations: bool, smooth: bool) -> Vec<String> {
     let mut names = vec!["time (s)".to_string()];
     for axis in &design.axes {
         for state in &axis.model.states {
             names.push(format!("{}_{} ({})", axis.name, state.name, state.unit));
             names.push(format!("{}_{}_sigma ({})", axis.name, state.name, state.unit));
+            for part in ["smoothed", "smoothed_sigma"].iter().filter(|_| smooth) {
+                names.push(format!("{}_{}_{part} ({})", axis.name, state.name, state.unit));
+            }
         }
         for measurement in axis.model.measurements.iter().filter(|_| innovations) {
             let unit = &measurement.unit;

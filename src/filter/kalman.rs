@@ -7,6 +7,9 @@ use nalgebra::{DMatrix, DVector};
 use super::transition::SparseTransition;
 use crate::model::LinearModel;
 
+/// Over a gap of so many samples an input is not held.
+const LONGEST_HELD: u64 = 1_000_000;
+
 /// One scalar-measurement update's results.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Update {
@@ -99,6 +102,20 @@ impl Kalman {
     pub fn drive(&mut self, u: &[f64]) {
         for (column, u) in self.g.column_iter().zip(u) {
             self.x.axpy(*u, &column, 1.0);
+        }
+    }
+
+    /// So many predictions, an input keeping its value; a gap of a million samples or more has lost an integrated input whatever it was.
+    pub fn advance(&mut self, steps: u64, input: Option<f64>) {
+        match (steps, input) {
+            (1, None) => self.predict(),
+            (steps, None) | (steps @ LONGEST_HELD.., Some(_)) => self.predict_many(steps),
+            (steps, Some(u)) => {
+                for _ in 0..steps {
+                    self.predict();
+                    self.drive(&[u]);
+                }
+            }
         }
     }
 

@@ -2,7 +2,7 @@
 //!
 //! Backwards from λ = 0, Λ = 0 after the last measurement: x(k|N) = x(k|k) − P(k|k) λ, P(k|N) = P(k|k) − P(k|k) Λ P(k|k); through a scalar measurement
 //! with C = I − K h: λ ← Cᵀλ − hᵀ ν/s, Λ ← CᵀΛC + hᵀh/s; through a prediction: λ ← Fᵀλ, Λ ← FᵀΛF. No covariance is inverted, so that constants,
-//! gaps and exactly known states need no exception. Memory: the filter is run twice, the second time in stretches of √N samples.
+//! gaps and exactly known states need no exception. Memory: the filter is run twice, the second time in stretches of √N rows.
 //! Sources: Rauch, Tung & Striebel 1965, AIAA J. 3; Bierman 1973, Automatica 9 (the adjoint form).
 
 use nalgebra::{DMatrix, DVector};
@@ -10,21 +10,47 @@ use nalgebra::{DMatrix, DVector};
 use super::kalman::Kalman;
 use crate::model::LinearModel;
 
-/// What a log says, sample by sample.
-#[derive(Clone, Copy, Debug)]
-pub struct Measured<'a> {
-    /// One series per measurement of the model, SI; NaN where there is none. Samples that are not multiples of its `every` are not looked at.
-    pub measurements: &'a [&'a [f64]],
-    /// One series per input, SI.
-    pub inputs: &'a [&'a [f64]],
-    /// Reject |ν| > gate √S.
-    pub gate: Option<f64>,
+/// What a filter was given, row by row: predictions with the input that was held, then the measurements that it accepted.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct History {
+    rows: Vec<Row>,
+    /// Measurement (row of H) and value.
+    taken: Vec<(usize, f64)>,
 }
 
-/// Filtered and smoothed estimates of every sample, SI.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Row {
+    /// Predictions since the row before; 0 for the first.
+    steps: u64,
+    input: Option<f64>,
+    /// Where its measurements end in `taken`.
+    end: usize,
+}
+
+impl History {
+    /// A new row, so many predictions after the one before.
+    pub fn row(&mut self, steps: u64, input: Option<f64>) {
+        self.rows.push(Row { steps, input, end: self.taken.len() });
+    }
+
+    /// A measurement that was accepted in this row, in the order of the updates.
+    pub fn take(&mut self, measurement: usize, z: f64) {
+        if let Some(row) = self.rows.last_mut() {
+            self.taken.push((measurement, z));
+            row.end = self.taken.len();
+        }
+    }
+
+    fn of(&self, row: usize) -> &[(usize, f64)] {
+        let first = row.checked_sub(1).map_or(0, |before| self.rows[before].end);
+        &self.taken[first..self.rows[row].end]
+    }
+}
+
+/// Filtered and smoothed estimates of every row, SI.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Smoothed {
-    /// x(k|k) per state and sample.
+    /// x(k|k) per state and row.
     pub filtered: Vec<Vec<f64>>,
     /// √P(k|k) of its diagonal.
     pub filtered_sigma: Vec<Vec<f64>>,
@@ -34,7 +60,7 @@ pub struct Smoothed {
     pub smoothed_sigma: Vec<Vec<f64>>,
 }
 
-/// One accepted measurement of a sample.
+/// One measurement of a row.
 struct Taken {
     measurement: usize,
     gain: DVector<f64>,
@@ -42,37 +68,35 @@ struct Taken {
     variance: f64,
 }
 
-/// One sample of the forward run: x(k|k), P(k|k) and what led there.
+/// One row of the forward run: x(k|k), P(k|k) and what led there.
 struct Epoch {
     x: DVector<f64>,
     p: DMatrix<f64>,
     taken: Vec<Taken>,
 }
 
-/// The smoothed log. Every series must have the same length; panics when a series of the model is missing.
-pub fn smooth(model: &LinearModel, measured: &Measured<'_>) -> Smoothed {
-    assert_eq!(measured.measurements.len(), model.measurements.len(), "measurements");
-    assert_eq!(measured.inputs.len(), model.inputs.len(), "inputs");
-    let (n, samples) = (model.x0.len(), measured.measurements.first().map_or(0, |series| series.len()));
-    let blank = || vec![vec![0.0; samples]; n];
+/// The smoothed rows.
+pub fn smooth(model: &LinearModel, history: &History) -> Smoothed {
+    let (n, rows) = (model.x0.len(), history.rows.len());
+    let blank = || vec![vec![0.0; rows]; n];
     let mut out = Smoothed { filtered: blank(), filtered_sigma: blank(), smoothed: blank(), smoothed_sigma: blank() };
-    let stretch = (samples as f64).sqrt().ceil().max(1.0) as usize;
+    let stretch = (rows as f64).sqrt().ceil().max(1.0) as usize;
     let mut filter = Kalman::new(model);
     let mut starts = Vec::new();
-    for k in 0..samples {
+    for k in 0..rows {
         if k % stretch == 0 {
             starts.push(filter.clone());
         }
-        step(model, measured, &mut filter, k, |_| ());
+        step(model, history, &mut filter, k, |_| ());
     }
     let mut adjoint = DVector::zeros(n);
     let mut information = DMatrix::zeros(n, n);
     for (i, mut filter) in starts.into_iter().enumerate().rev() {
         let first = i * stretch;
-        let epochs: Vec<Epoch> = (first..samples.min(first + stretch))
+        let epochs: Vec<Epoch> = (first..rows.min(first + stretch))
             .map(|k| {
                 let mut taken = Vec::new();
-                step(model, measured, &mut filter, k, |t| taken.push(t));
+                step(model, history, &mut filter, k, |t| taken.push(t));
                 Epoch { x: filter.x.clone(), p: filter.p.clone(), taken }
             })
             .collect();
@@ -82,7 +106,7 @@ pub fn smooth(model: &LinearModel, measured: &Measured<'_>) -> Smoothed {
             let p = &epoch.p - &epoch.p * &information * &epoch.p;
             for s in 0..n {
                 out.filtered[s][k] = epoch.x[s];
-                out.filtered_sigma[s][k] = epoch.p[(s, s)].sqrt();
+                out.filtered_sigma[s][k] = epoch.p[(s, s)].max(0.0).sqrt();
                 out.smoothed[s][k] = x[s];
                 // a constant that is known exactly may be off by rounding
                 out.smoothed_sigma[s][k] = p[(s, s)].max(0.0).sqrt();
@@ -93,36 +117,52 @@ pub fn smooth(model: &LinearModel, measured: &Measured<'_>) -> Smoothed {
                 adjoint = kept.tr_mul(&adjoint) - &h * (taken.innovation / taken.variance);
                 information = kept.tr_mul(&(&information * &kept)) + &h * h.transpose() / taken.variance;
             }
-            if k > 0 {
-                adjoint = model.f.tr_mul(&adjoint);
-                information = model.f.tr_mul(&(&information * &model.f));
+            match history.rows[k].steps {
+                0 => {}
+                1 => {
+                    adjoint = model.f.tr_mul(&adjoint);
+                    information = model.f.tr_mul(&(&information * &model.f));
+                }
+                steps => {
+                    let f = power(&model.f, steps);
+                    adjoint = f.tr_mul(&adjoint);
+                    information = f.tr_mul(&(&information * &f));
+                }
             }
         }
     }
     out
 }
 
-/// The filter through sample k; `told` of every measurement that it took.
-fn step(model: &LinearModel, measured: &Measured<'_>, filter: &mut Kalman, k: usize, mut told: impl FnMut(Taken)) {
-    if k > 0 {
-        filter.predict();
-        let driven: Vec<f64> = measured.inputs.iter().map(|series| series[k - 1]).collect();
-        filter.drive(&driven);
+/// Fⁿ by squares.
+fn power(f: &DMatrix<f64>, mut n: u64) -> DMatrix<f64> {
+    let (mut out, mut square) = (DMatrix::identity(f.nrows(), f.nrows()), f.clone());
+    while n > 0 {
+        if n & 1 == 1 {
+            out *= &square;
+        }
+        n >>= 1;
+        if n > 0 {
+            square = &square * &square;
+        }
     }
-    for (measurement, series) in measured.measurements.iter().enumerate() {
-        if !k.is_multiple_of(model.every[measurement]) || series[k].is_nan() {
-            continue;
-        }
-        let h = model.h.row(measurement).transpose();
-        let cross = &filter.p * &h;
-        let update = filter.update(measurement, series[k], measured.gate);
-        if update.accepted {
-            told(Taken {
-                measurement,
-                gain: cross / update.variance,
-                innovation: update.innovation,
-                variance: update.variance,
-            });
-        }
+    out
+}
+
+/// The filter through one row; `told` of every measurement.
+fn step(model: &LinearModel, history: &History, filter: &mut Kalman, k: usize, mut told: impl FnMut(Taken)) {
+    let row = history.rows[k];
+    if row.steps > 0 {
+        filter.advance(row.steps, row.input);
+    }
+    for (measurement, z) in history.of(k) {
+        let cross = &filter.p * model.h.row(*measurement).transpose();
+        let update = filter.update(*measurement, *z, None);
+        told(Taken {
+            measurement: *measurement,
+            gain: cross / update.variance,
+            innovation: update.innovation,
+            variance: update.variance,
+        });
     }
 }

@@ -8,11 +8,9 @@ use crate::consistency::low_frequency::{LowFrequency, time_constants};
 use crate::consistency::whiteness::Autocorrelation;
 use crate::filter::AxisDesign;
 use crate::filter::kalman::{Kalman, Update};
+use crate::filter::smoother::History;
 use crate::model::LinearModel;
 use crate::numerics::reduce::Sum;
-
-/// Over a gap of more samples an input is not held.
-const LONGEST_HELD: u64 = 1_000_000;
 
 /// One axis in progress.
 #[derive(Clone, Debug)]
@@ -33,6 +31,8 @@ pub(super) struct AxisReplay {
     pub(super) unusable: u64,
     pub(super) gaps: u64,
     pub(super) missing: u64,
+    /// For smoothing.
+    pub(super) history: Option<History>,
 }
 
 /// One measurement in progress.
@@ -85,6 +85,7 @@ impl AxisReplay {
             unusable: 0,
             gaps: 0,
             missing: 0,
+            history: None,
         }
     }
 
@@ -98,6 +99,8 @@ impl AxisReplay {
         self.samples += 1;
         if self.started {
             self.advance(missing);
+        } else if let Some(history) = &mut self.history {
+            history.row(0, None);
         }
         self.started = true;
         self.channels.iter_mut().for_each(|channel| channel.last = None);
@@ -133,6 +136,9 @@ impl AxisReplay {
             }
             return;
         }
+        if let Some(history) = &mut self.history {
+            history.take(index, z);
+        }
         self.start.update(self.step, index, z, &update);
         channel.log_likelihood.add(update.log_likelihood);
         channel.autocorrelation.push(y);
@@ -145,7 +151,10 @@ impl AxisReplay {
     /// Predictions to the next sample, with `missing` samples in between.
     fn advance(&mut self, missing: u64) {
         let steps = missing.saturating_add(1);
-        advance(&mut self.kalman, steps, self.input);
+        self.kalman.advance(steps, self.input);
+        if let Some(history) = &mut self.history {
+            history.row(steps, self.input);
+        }
         self.start.predict(steps, self.input);
         if missing > 0 {
             self.gaps += 1;
@@ -155,21 +164,6 @@ impl AxisReplay {
             }
         }
         self.step = self.step.saturating_add(steps);
-    }
-}
-
-/// So many predictions; an input keeps its value.
-fn advance(kalman: &mut Kalman, steps: u64, input: Option<f64>) {
-    match (steps, input) {
-        (1, None) => kalman.predict(),
-        // a gap so long has lost an integrated angle whatever the input was
-        (steps, None) | (steps @ LONGEST_HELD.., Some(_)) => kalman.predict_many(steps),
-        (steps, Some(u)) => {
-            for _ in 0..steps {
-                kalman.predict();
-                kalman.drive(&[u]);
-            }
-        }
     }
 }
 
@@ -245,7 +239,7 @@ impl StartTest {
 
     fn predict(&mut self, steps: u64, input: Option<f64>) {
         if let Some(kalman) = &mut self.shifted {
-            advance(kalman, steps, input);
+            kalman.advance(steps, input);
         }
     }
 

@@ -12,10 +12,12 @@ mod axis;
 pub mod trace;
 pub mod verdict;
 
+use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::consistency::{Test, Verdict};
+use crate::filter::smoother::{History, Smoothed, smooth};
 use crate::filter::{AxisDesign, FilterDesign};
 use crate::input::Block;
 use crate::model::{LinearModel, Named};
@@ -349,6 +351,19 @@ impl Replayer {
                 }
             }
         }
+    }
+
+    /// From here on every row is kept, for [`smoothed`](Replayer::smoothed): 40 bytes per row and axis, and 16 per measurement.
+    pub fn remember(&mut self) {
+        self.axes.iter_mut().for_each(|axis| axis.history = Some(History::default()));
+    }
+
+    /// Filtered and smoothed estimates of every row that was remembered, per axis.
+    pub fn smoothed(&self) -> Vec<Smoothed> {
+        let of = |(axis, design): (&AxisReplay, &AxisDesign)| {
+            axis.history.as_ref().map(|history| smooth(&design.model, history)).unwrap_or_default()
+        };
+        self.axes.par_iter().zip(&self.design.axes).map(of).collect()
     }
 
     /// The statistics and the verdict.

@@ -1,6 +1,7 @@
 //! Intervals of the parameters: from the observed information, or from the profile likelihood where that is not enough.
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use super::ordinates::Ordinates;
 use super::whittle::{self, Fit};
@@ -34,6 +35,7 @@ pub(super) fn precisions(data: &Ordinates, fit: &Fit) -> Vec<Precision> {
     let observed = deviations(whittle::observed_information(data, fit));
     let bounds = whittle::bounds(data, &fit.form, &fit.logs);
     (0..fit.logs.len())
+        .into_par_iter()
         .map(|i| {
             let (sigma, bound) = (observed[i], expected[i]);
             let drift = fit.form.pieces()[fit.form.roles()[i].0].kind().is_drift();

@@ -14,6 +14,8 @@ pub mod temperature;
 mod turn_on;
 mod whittle;
 
+use rayon::prelude::*;
+
 use super::selection::FIT_LEVEL;
 use super::shape::Role;
 use super::shape::document_name;
@@ -72,7 +74,7 @@ pub(super) fn identify(
         ModelChoice::Terms(kinds) => (forms(kinds).iter().filter_map(|form| growth::fit(&data, form)).collect(), true),
     };
     let mut fits: Vec<(Fit, Vec<Precision>)> = fits
-        .into_iter()
+        .into_par_iter()
         .map(|fit| {
             let known = precisions(&data, &fit);
             (fit, known)
@@ -384,7 +386,6 @@ fn choice_of(data: &Ordinates, fits: &[(Fit, Vec<Precision>)], held_out: &[Optio
 
 /// ln L of the last third of the log under the parameters that the first two thirds give, by candidate.
 fn held_out(rate: &[f64], data: &Ordinates, fits: &[(Fit, Vec<Precision>)]) -> Vec<Option<f64>> {
-    use rayon::prelude::*;
     let (early, late) = rate.split_at((rate.len() as f64 * FITTED_SHARE) as usize);
     let [early, late] = [early, late].map(|part| Ordinates::new(part, data.dt, Some(&data.lines)));
     let of = |(fit, _): &(Fit, Vec<Precision>)| {

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{LinearModel, Named};
+use super::LinearModel;
 use crate::numerics::linalg::{LinalgError, eigenvalues, singular_values};
 use crate::units::digits;
 
@@ -252,14 +252,11 @@ fn told_apart(model: &LinearModel, constant: &str) -> Vec<String> {
         let pole = model.f[(i, i)];
         if pole > 0.0 && pole < 1.0 - MARGINAL {
             let tc = -model.dt / pole.ln();
-            let sigma = (model.q[(i, i)] / ((1.0 - pole) * (1.0 + pole))).sqrt();
-            let Named { name, unit } = &model.states[i];
+            let name = &model.states[i].name;
             lines.push(format!(
-                "{constant} and {name} (correlation time {} s, standard deviation {} {unit}) are told apart only through the \
-                 drift's decay: {constant} is known to half that standard deviation after about {} s (8 correlation times), \
-                 to a tenth after {} s (200).",
+                "{constant} and {name} (correlation time {} s) are told apart only through the drift's decay: {constant} is known to half \
+                 the standard deviation of {name} after about {} s (8 correlation times), to a tenth after {} s (200).",
                 digits(tc),
-                digits(sigma),
                 digits(8.0 * tc),
                 digits(200.0 * tc)
             ));

@@ -124,7 +124,7 @@ impl Effect {
     }
 }
 
-/// The effect of the temperature on an axis of which `fitted` is the model; `rate`, `logs`, `dt` and `display` as for [`super::identify`].
+/// The effect of the temperature on an axis of which `fitted` is the model; `rate`, `logs`, `dt` and `display` as for `identify`.
 ///
 /// The error is the reason why nothing can be said: a temperature that does not change, or only as a ramp of the model does.
 pub fn effect(

@@ -170,7 +170,7 @@ fn gmwm_study_of_model_choice() {
 }
 
 /// Logs of the model that the authors of the method publish for the x gyroscope of an MTi-G at 100 Hz (course of the SMAC group, chapter 5:
-/// three first-order autoregressions from 19 scales, 873,684 samples): our estimates of the two slow ones beside the published standard errors.
+/// three first-order autoregressions from 19 scales; 873,684 samples are assumed): our estimates of the two slow ones beside the published standard errors.
 /// The fast one (phi = 0.1256) is white noise to us: averages of less than some samples are left out.
 #[test]
 #[ignore = "a study of minutes that prints figures, not a check"]

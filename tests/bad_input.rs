@@ -212,6 +212,20 @@ fn a_log_that_cannot_be_read() {
             npy_flags,
             &["log.npy: truncated"],
         ),
+        (
+            "a cut HDF5 file",
+            "log.h5",
+            b"\x89HDF\r\n\x1a\n\0\0".to_vec(),
+            "allan log.h5",
+            &["log.h5: truncated or damaged"],
+        ),
+        (
+            "a MATLAB file that is only its header",
+            "log.mat",
+            b"MATLAB 5.0 MAT-file, cut".to_vec(),
+            "allan log.mat",
+            &["log.mat: truncated: the file ends inside a variable"],
+        ),
         ("binary file", "log.csv", vec![0, 1, 2, 3, 0, 255], run, &["log.csv: this is a binary file"]),
         (
             "damaged gzip",

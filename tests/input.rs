@@ -1,5 +1,9 @@
 //! Logs in every form that is read, against what independent readers say.
 
+#[path = "input/arrays.rs"]
+mod arrays;
+#[path = "input/damage.rs"]
+mod damage;
 #[path = "input/measured.rs"]
 mod measured;
 #[path = "input/npy.rs"]
@@ -24,6 +28,7 @@ fn options(flags: Flags) -> LogOptions {
     for (flag, value) in flags {
         match *flag {
             "columns" => options.columns = Some(value.split(',').map(str::to_string).collect()),
+            "topic" => options.topic = Some((*value).to_string()),
             "time" => options.time = Some((*value).to_string()),
             "unit" => options.unit = Some(Unit::parse(value).unwrap()),
             "rate" => options.rate_hz = Some(value.parse().unwrap()),

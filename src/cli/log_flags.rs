@@ -13,6 +13,9 @@ pub struct LogFlags {
     /// Columns to use: names or 1-based numbers, comma separated [default: found by name]
     #[arg(long, value_delimiter = ',', value_name = "COLUMNS")]
     pub columns: Option<Vec<String>>,
+    /// Which table of a file with several (`kfdesign info` lists them): a message, topic or array, `sensor_gyro:1`
+    #[arg(long, value_name = "NAME")]
+    pub topic: Option<String>,
     /// Time column: name or 1-based number; `none` ignores time columns
     #[arg(long, value_name = "COLUMN")]
     pub time: Option<String>,
@@ -58,6 +61,7 @@ impl LogFlags {
     pub fn options(&self) -> anyhow::Result<LogOptions> {
         Ok(LogOptions {
             columns: self.columns.clone(),
+            topic: self.topic.clone(),
             time: self.time.clone(),
             unit: self.unit.as_deref().map(Unit::parse).transpose().map_err(|e| anyhow::anyhow!("--unit: {e}"))?,
             rate_hz: self.rate,

@@ -26,6 +26,19 @@ pub(super) struct Table<'a> {
     pub(super) named: bool,
     /// File, and line of the header: the beginning of every message.
     pub(super) place: &'a str,
+    /// The sample rate, where the file says it.
+    pub(super) rate_hz: Option<f64>,
+}
+
+/// A column that may be an axis.
+struct Candidate {
+    column: usize,
+    quantity: Quantity,
+    /// By its name, not only its unit.
+    named: bool,
+    /// Its words without that of the axis.
+    stem: Vec<String>,
+    axis: bool,
 }
 
 /// The dimension of the values.
@@ -36,7 +49,7 @@ pub(super) fn dimension(quantity: Quantity, kind: InputKind) -> Dimension {
     }
 }
 
-fn quantity_of(unit: &Unit, kind: InputKind) -> Option<Quantity> {
+pub(super) fn quantity_of(unit: &Unit, kind: InputKind) -> Option<Quantity> {
     [Quantity::AngularRate, Quantity::SpecificForce].into_iter().find(|q| dimension(*q, kind) == unit.dimension())
 }
 
@@ -87,7 +100,7 @@ impl Table<'_> {
     }
 
     /// A name (with or without its unit, upper or lower case) or a 1-based number.
-    fn find(&self, wanted: &str) -> Result<usize, InputError> {
+    pub(super) fn find(&self, wanted: &str) -> Result<usize, InputError> {
         let wanted = wanted.trim();
         let lower = wanted.to_lowercase();
         let tests: [&dyn Fn(&Head) -> bool; 4] =
@@ -127,27 +140,12 @@ impl Table<'_> {
         Ok(columns)
     }
 
-    /// The gyro (else the accelerometer) by names, else by units.
-    fn by_name(&self, options: &LogOptions) -> Result<Vec<usize>, InputError> {
-        if !self.named {
-            return match self.heads.len() {
-                1 => Ok(vec![0]),
-                n => self.fail(format!(
-                    "no header names the {n} columns; say which with --columns, for example --columns 1,2,3"
-                )),
-            };
-        }
-        struct Candidate {
-            column: usize,
-            quantity: Quantity,
-            named: bool,
-            stem: Vec<String>,
-            axis: bool,
-        }
+    /// Columns that by name or unit hold the output of a sensor.
+    fn candidates(&self, kind: InputKind) -> Vec<Candidate> {
         let mut candidates = Vec::new();
-        for (column, head) in self.heads.iter().enumerate() {
+        for (column, head) in self.heads.iter().enumerate().filter(|(_, head)| !head.silent) {
             let mut stem = words(&head.name);
-            let by_unit = head.unit.as_ref().and_then(|u| quantity_of(u, options.kind));
+            let by_unit = head.unit.as_ref().and_then(|u| quantity_of(u, kind));
             let sensor = sensor_of(&stem);
             let warm = head.unit.as_ref().is_some_and(|unit| unit.dimension() == Dimension::TEMPERATURE);
             let excluded = warm || is_excluded(&stem);
@@ -158,7 +156,26 @@ impl Table<'_> {
             }
             candidates.push(Candidate { column, quantity, named: sensor.is_some(), stem, axis: axis.is_some() });
         }
-        let from_flag = options.quantity.or_else(|| options.unit.as_ref().and_then(|u| quantity_of(u, options.kind)));
+        candidates
+    }
+
+    /// There is a sensor of this quantity among the columns.
+    pub(super) fn has(&self, quantity: Quantity, options: &LogOptions) -> bool {
+        self.named && self.candidates(options.kind).iter().any(|c| c.quantity == quantity)
+    }
+
+    /// The gyro (else the accelerometer) by names, else by units.
+    fn by_name(&self, options: &LogOptions) -> Result<Vec<usize>, InputError> {
+        if !self.named {
+            return match self.heads.len() {
+                1 => Ok(vec![0]),
+                n => self.fail(format!(
+                    "no header names the {n} columns; say which with --columns, for example --columns 1,2,3"
+                )),
+            };
+        }
+        let mut candidates = self.candidates(options.kind);
+        let from_flag = options.sought();
         let quantity = from_flag.unwrap_or_else(|| {
             let gyro = candidates.iter().any(|c| c.quantity == Quantity::AngularRate);
             if gyro { Quantity::AngularRate } else { Quantity::SpecificForce }
@@ -291,7 +308,7 @@ impl Table<'_> {
     }
 
     fn no_time(&self, options: &LogOptions) -> Result<Option<(usize, Unit)>, InputError> {
-        match options.rate_hz {
+        match options.rate_hz.or(self.rate_hz) {
             Some(_) => Ok(None),
             None => self.fail("no sample rate: no time column is used; give --rate HZ, or --time COLUMN"),
         }

@@ -1,9 +1,15 @@
 //! Log files to [`Recording`] (floor 2): recognise the format, choose columns, units and rate, read in one or two streaming passes.
 
+mod arrays;
+mod bytes;
 mod columns;
+mod hdf5;
+mod mat;
 mod names;
 mod npy;
+mod number;
 mod sniff;
+mod source;
 mod temperature;
 mod text;
 
@@ -15,7 +21,7 @@ use sha2::{Digest, Sha256};
 
 use self::columns::Choice;
 use self::names::Head;
-use crate::signal::check::{AxisRange, BackwardStamp, Checker, Outcome, TimeBase};
+use crate::signal::check::{AxisRange, BackwardStamp, Checker, Finding, Outcome, TimeBase};
 use crate::signal::{Axis, Gap, LogCheck, Recording};
 use crate::units::{Dimension, Quantity, Unit};
 
@@ -40,10 +46,19 @@ pub struct LogOptions {
     pub kind: InputKind,
     /// Prefer this quantity when the log holds both (default angular rate).
     pub quantity: Option<Quantity>,
+    /// Which table of a file with several.
+    pub topic: Option<String>,
     /// Only [`read`] takes it.
     pub temperature: TemperatureColumn,
     /// Columns beside the axes, of any dimension.
     pub extra: Vec<ExtraColumn>,
+}
+
+impl LogOptions {
+    /// The quantity that the flags say, by name or by the dimension of the unit.
+    fn sought(&self) -> Option<Quantity> {
+        self.quantity.or_else(|| self.unit.as_ref().and_then(|unit| columns::quantity_of(unit, self.kind)))
+    }
 }
 
 /// A column that is no axis of the sensor: its empty fields are no fault of the log.
@@ -118,27 +133,16 @@ trait Table {
     /// `beside`: a column behind the axes, in which text is a missing value.
     fn select(&mut self, time: Option<usize>, axes: &[usize], beside: Option<usize>);
     fn rewind(&mut self) -> Result<(), InputError>;
-    /// Number of rows, where the file says it.
+    /// Number of rows, where it is known to be true.
     fn rows(&self) -> Option<u64>;
+    /// The sample rate in Hz and what the file calls it, where it says it.
+    fn rate(&self) -> Option<(String, f64)> {
+        None
+    }
     /// The first stamp of the file, in the file's unit.
     fn origin(&self) -> f64;
     /// Up to [`BLOCK`] further rows; false at the end.
     fn next_rows(&mut self, rows: &mut Rows) -> Result<bool, InputError>;
-}
-
-fn open_table(path: &Path) -> Result<Box<dyn Table + Send>, InputError> {
-    let fail = |what: String| Err(InputError { message: format!("{}: {what}", path.display()) });
-    match std::fs::metadata(path) {
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return fail("there is no such file".into()),
-        Err(error) => return fail(format!("cannot read: {error}")),
-        Ok(found) if found.is_dir() => return fail("this is a folder, not a log".into()),
-        Ok(found) if !found.is_file() => return fail("a log is read more than once: save it to a file first".into()),
-        Ok(_) => {}
-    }
-    match path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy")) {
-        true => Ok(Box::new(npy::NpyTable::open(path)?)),
-        false => Ok(Box::new(text::TextTable::open(path)?)),
-    }
 }
 
 /// The rows between `--start` and `--end`: from the first row at or after the start to the last before one beyond the end.
@@ -181,6 +185,8 @@ struct Log {
     table: Box<dyn Table + Send>,
     choice: Choice,
     options: LogOptions,
+    /// What was decided that the flags do not say.
+    notes: Vec<Finding>,
 }
 
 /// What the first pass found.
@@ -206,12 +212,21 @@ impl Log {
         {
             return fail("--start must be before --end");
         }
-        let mut table = open_table(path)?;
-        let (named, place) = (table.named(), table.place());
-        let choice = columns::Table { heads: &table.heads(), named, place: &place }.choose(options)?;
+        let (mut table, note) = source::choose(path, source::open(path)?, options)?;
+        let (named, place, rate) = (table.named(), table.place(), table.rate());
+        let rate_hz = rate.as_ref().map(|(_, rate)| *rate);
+        let choice = columns::Table { heads: &table.heads(), named, place: &place, rate_hz }.choose(options)?;
+        let mut notes: Vec<Finding> = note.map(|note| Finding::note("topic", note)).into_iter().collect();
+        let mut options = options.clone();
+        if choice.time.is_none()
+            && let (None, Some((name, rate))) = (options.rate_hz, rate)
+        {
+            options.rate_hz = Some(rate);
+            notes.push(Finding::note("rate", format!("{rate} Hz by '{name}' of the file")));
+        }
         let beside = choice.temperature.column.as_ref().map(|(column, _)| *column);
         table.select(choice.time.as_ref().map(|(column, _)| *column), &choice.columns, beside);
-        Ok(Log { table, choice, options: options.clone() })
+        Ok(Log { table, choice, options, notes })
     }
 
     /// Stamps that are used for time.
@@ -231,7 +246,7 @@ impl Log {
             {
                 let heads = self.table.heads();
                 let head = heads[*column];
-                let table = columns::Table { heads: &heads, named: self.table.named(), place: "" };
+                let table = columns::Table { heads: &heads, named: self.table.named(), place: "", rate_hz: None };
                 return Err(InputError {
                     message: format!(
                         "{}, column '{}': the time stamp is empty; choose another with --time{}, or give --rate HZ",
@@ -282,7 +297,8 @@ impl Log {
             }
             self.enough(checker.rows(), &selection)?;
             match checker.finish() {
-                Outcome::Done { check, gaps, axes } => {
+                Outcome::Done { mut check, gaps, axes } => {
+                    check.findings.splice(0..0, self.notes.iter().cloned());
                     self.usable(&axes, &check)?;
                     let origin = self.choice.time.as_ref().map_or(0.0, |(_, unit)| unit.to_si(self.table.origin()));
                     return Ok(Scan { check, gaps, first_s, start_s: origin + first_s });

@@ -15,6 +15,8 @@ pub(super) struct Head {
     /// What stands where a unit would stand, if anything does.
     pub(super) unit_text: Option<String>,
     pub(super) unit: Option<Unit>,
+    /// The name does not say what the column is: one of several under one name.
+    pub(super) silent: bool,
 }
 
 /// Units written behind a name and the unit meant, longest first where one ends in another.
@@ -154,7 +156,7 @@ impl Head {
     pub(super) fn parse(cell: &str) -> Head {
         let full = cell.trim().to_string();
         let text = inside_type(&full).unwrap_or(&full);
-        let mut head = Head { full: full.clone(), name: text.to_string(), unit_text: None, unit: None };
+        let mut head = Head { full: full.clone(), name: text.to_string(), unit_text: None, unit: None, silent: false };
         if let Some((name, inner)) = bracketed(text) {
             if !is_index(inner) {
                 head.set_unit(name, inner);
@@ -172,7 +174,7 @@ impl Head {
     /// A column that has only a number (from 1).
     pub(super) fn numbered(number: usize) -> Head {
         let name = format!("column {number}");
-        Head { full: name.clone(), name, unit_text: None, unit: None }
+        Head { full: name.clone(), name, unit_text: None, unit: None, silent: false }
     }
 
     /// The unit that stands in a row of its own below the names.

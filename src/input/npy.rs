@@ -9,8 +9,9 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use self::header::{Header, Number};
+use self::header::Header;
 use super::names::Head;
+use super::number::Number;
 use super::{BLOCK, InputError, Rows, Table};
 
 /// More columns are a transposed array.

@@ -137,15 +137,7 @@ pub(super) fn usable(
     values: Option<Vec<f64>>,
     options: &LogOptions,
 ) -> Result<(Option<Read>, Option<Finding>), String> {
-    let note = |message: String| Finding {
-        kind: "temperature".into(),
-        axis: None,
-        count: 1,
-        first_index: 0,
-        first_s: 0.0,
-        message,
-        serious: false,
-    };
+    let note = |message: String| Finding::note("temperature", message);
     match (found.column, values) {
         (Some((_, info)), Some(values)) if !values.iter().any(|v| v.is_finite()) => {
             let message = format!("temperature column '{}' holds no number in {} rows", info.name, values.len());

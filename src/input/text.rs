@@ -239,10 +239,9 @@ fn stamp(field: &[u8], decimal_comma: bool) -> Option<(i64, f64)> {
 
 /// Why this is no text log, if the first bytes say so.
 fn not_text(bytes: &[u8]) -> Option<String> {
-    const KNOWN: [(&[u8], &str); 13] = [
-        (b"\x89HDF", "an HDF5 file"),
-        (b"MATLAB 5.0", "a MATLAB file"),
-        (b"MATLAB 7.3", "a MATLAB 7.3 (HDF5) file"),
+    const KNOWN: [(&[u8], &str); 12] = [
+        (b"\x89HDF", "an HDF5 file, compressed as a whole"),
+        (b"MATLAB ", "a MATLAB file, compressed as a whole"),
         (b"ULog\x01\x12\x35", "a PX4 ULog"),
         (b"#ROSBAG V", "a ROS bag"),
         (b"\x89MCAP", "an MCAP file"),
@@ -252,7 +251,7 @@ fn not_text(bytes: &[u8]) -> Option<String> {
         (b"PAR1", "a Parquet file"),
         (b"PK\x03\x04", "a zip archive (npz, xlsx?)"),
         (b"\x28\xb5\x2f\xfd", "compressed with zstd"),
-        (b"\x93NUMPY", "a NumPy array, compressed or not named .npy"),
+        (b"\x93NUMPY", "a NumPy array, compressed"),
     ];
     let what = match KNOWN.iter().find(|(magic, _)| bytes.starts_with(magic)) {
         Some((_, what)) => what,
@@ -260,5 +259,5 @@ fn not_text(bytes: &[u8]) -> Option<String> {
         None if bytes.contains(&0) => "a binary file",
         None => return None,
     };
-    Some(format!("this is {what}; text (csv, also .gz) and .npy are read"))
+    Some(format!("this is {what}; text (csv, also .gz), .npy, MATLAB and HDF5 files are read"))
 }

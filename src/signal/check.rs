@@ -40,7 +40,7 @@ pub enum TimeBase {
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Finding {
     /// Short code: "jitter", "gap", "repeated-stamp", "backward-stamp", "rate", "zero-row", "repeated-row", "nan", "stuck",
-    /// "saturated", "quantised", "outlier", "motion", "temperature".
+    /// "saturated", "quantised", "outlier", "motion", "temperature", "topic".
     pub kind: String,
     pub axis: Option<String>,
     pub count: u64,
@@ -50,6 +50,13 @@ pub struct Finding {
     pub message: String,
     /// True when results cannot be trusted without acting on it.
     pub serious: bool,
+}
+
+impl Finding {
+    /// What is no fault but should be known.
+    pub fn note(kind: &str, message: String) -> Finding {
+        Finding { kind: kind.into(), axis: None, count: 1, first_index: 0, first_s: 0.0, message, serious: false }
+    }
 }
 
 /// What the check of a whole log says.

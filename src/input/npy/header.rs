@@ -2,25 +2,11 @@
 
 use std::io::{Read, Seek, SeekFrom};
 
+use super::super::number::{Kind, Number};
+
 /// Longer headers are damage or an attack.
 const LONGEST: u64 = 1 << 20;
 const DEEPEST: usize = 8;
-
-/// How one number is stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Number {
-    kind: Kind,
-    big_endian: bool,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    Float(u8),
-    Signed(u8),
-    Unsigned(u8),
-    /// Nanoseconds and the like since 1970, or a span of them; the smallest value is "not a time".
-    Time,
-}
 
 /// One field of a structured array, or the only one of a plain array.
 #[derive(Clone, Debug)]
@@ -41,49 +27,6 @@ pub(super) struct Header {
     pub(super) fortran_order: bool,
     pub(super) shape: Vec<u64>,
     pub(super) data_start: u64,
-}
-
-impl Number {
-    pub(super) fn size(self) -> usize {
-        match self.kind {
-            Kind::Float(size) | Kind::Signed(size) | Kind::Unsigned(size) => size as usize,
-            Kind::Time => 8,
-        }
-    }
-
-    /// Whole and fraction of the value at the start of `bytes`; integers keep every digit.
-    pub(super) fn decode(self, bytes: &[u8]) -> (i128, f64) {
-        let mut raw = 0u64;
-        for i in 0..self.size() {
-            let byte = bytes.get(if self.big_endian { i } else { self.size() - 1 - i }).copied().unwrap_or(0);
-            raw = raw << 8 | u64::from(byte);
-        }
-        let signed = |size: u8| {
-            let unused = 64 - 8 * u32::from(size);
-            i128::from(((raw << unused) as i64) >> unused)
-        };
-        match self.kind {
-            Kind::Float(2) => (0, half(raw as u16)),
-            Kind::Float(4) => (0, f64::from(f32::from_bits(raw as u32))),
-            Kind::Float(_) => (0, f64::from_bits(raw)),
-            Kind::Signed(size) => (signed(size), 0.0),
-            Kind::Unsigned(_) => (i128::from(raw), 0.0),
-            Kind::Time if raw == 1 << 63 => (0, f64::NAN),
-            Kind::Time => (signed(8), 0.0),
-        }
-    }
-}
-
-/// IEEE 754 half precision.
-fn half(bits: u16) -> f64 {
-    let sign = if bits >> 15 == 1 { -1.0 } else { 1.0 };
-    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023));
-    sign * match exponent {
-        0 => fraction * 2f64.powi(-24),
-        31 if fraction == 0.0 => f64::INFINITY,
-        31 => f64::NAN,
-        _ => (1024.0 + fraction) * 2f64.powi(exponent - 25),
-    }
 }
 
 impl Header {

@@ -1,0 +1,293 @@
+//! Files of named arrays (MATLAB, HDF5): arrays of one length in one group are the columns of one table.
+//!
+//! Samples run along the longer side of a matrix. Its columns are named after it: `_x, _y, _z` of three, `_w, _x, _y, _z` of four whose name
+//! says quaternion, `_1, _2, …` of any other number, which then say nothing of a sensor.
+
+use std::path::{Path, PathBuf};
+
+use super::names::{Head, words};
+use super::number::Split;
+use super::source::{Source, Topic};
+use super::{BLOCK, InputError, Rows, Table};
+
+/// More columns than this are no channels of a log.
+const MOST_COLUMNS: u64 = 4096;
+
+/// An array of numbers in a file.
+#[derive(Clone, Debug)]
+pub(super) struct Array {
+    /// `group/name`, or `structure.name`.
+    pub(super) path: String,
+    /// As stored: rows and columns where the first index is that of the row.
+    pub(super) rows: u64,
+    pub(super) columns: u64,
+    /// As the file says it.
+    pub(super) unit: Option<String>,
+    /// Names of the columns, where the file says them.
+    pub(super) fields: Vec<String>,
+}
+
+/// Where a number stands.
+pub(super) type Put<'a> = dyn FnMut(u64, u64, Split) + 'a;
+
+/// A file of arrays.
+pub(super) trait ArrayFile: Send {
+    fn format(&self) -> &'static str;
+    /// Of at least one number each.
+    fn arrays(&self) -> &[Array];
+    /// Numbers that stand alone: name and value.
+    fn scalars(&self) -> &[(String, f64)];
+    /// Hands every number of an array out, with its row and column, in whatever order it is stored.
+    fn load(&mut self, array: usize, put: &mut Put) -> Result<(), InputError>;
+}
+
+pub(super) struct ArraySource {
+    path: PathBuf,
+    file: Box<dyn ArrayFile>,
+    topics: Vec<Topic>,
+    /// Per topic and column: the array, its column, and whether samples run along the stored columns.
+    places: Vec<Vec<Place>>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    array: usize,
+    column: u64,
+    across: bool,
+}
+
+impl ArraySource {
+    pub(super) fn new(path: &Path, file: Box<dyn ArrayFile>) -> Result<ArraySource, InputError> {
+        let mut groups: Vec<(String, u64)> = Vec::new();
+        let (mut topics, mut places): (Vec<Topic>, Vec<Vec<Place>>) = (Vec::new(), Vec::new());
+        for (i, array) in file.arrays().iter().enumerate() {
+            let across = array.columns > array.rows && array.fields.is_empty();
+            let (rows, columns) = if across { (array.columns, array.rows) } else { (array.rows, array.columns) };
+            if rows < 2 || columns > MOST_COLUMNS {
+                continue;
+            }
+            let (group, name) = array.path.rsplit_once(['/', '.']).unwrap_or(("", &array.path));
+            let at = groups.iter().position(|(g, n)| g == group && *n == rows).unwrap_or_else(|| {
+                groups.push((group.to_string(), rows));
+                let topic = Topic {
+                    name: array.path.clone(),
+                    aliases: vec![group.to_string()],
+                    heads: Vec::new(),
+                    named: true,
+                    rows: Some(rows),
+                    rank: 0,
+                };
+                topics.push(topic);
+                places.push(Vec::new());
+                groups.len() - 1
+            });
+            topics[at].aliases.push(array.path.clone());
+            topics[at].heads.extend(heads(name, columns, array));
+            places[at].extend((0..columns).map(|column| Place { array: i, column, across }));
+        }
+        if topics.is_empty() {
+            let names: Vec<&str> = file.arrays().iter().take(40).map(|a| a.path.as_str()).collect();
+            let found = if names.is_empty() { "none at all".into() } else { format!("only {}", names.join(", ")) };
+            let message = format!("{}: no array of two or more rows of numbers; there is {found}", path.display());
+            return Err(InputError { message });
+        }
+        Ok(ArraySource { path: path.to_path_buf(), file, topics, places })
+    }
+}
+
+/// What the columns of an array are called.
+fn heads(name: &str, columns: u64, array: &Array) -> Vec<Head> {
+    let quaternion = words(name).iter().any(|word| ["quat", "quaternion", "quaternions", "q"].contains(&word.as_str()));
+    let axes: Vec<String> = match columns {
+        _ if !array.fields.is_empty() => array.fields.clone(),
+        1 => vec![name.to_string()],
+        3 => ["x", "y", "z"].iter().map(|axis| format!("{name}_{axis}")).collect(),
+        4 if quaternion => ["w", "x", "y", "z"].iter().map(|axis| format!("{name}_{axis}")).collect(),
+        _ => (1..=columns).map(|i| format!("{name}_{i}")).collect(),
+    };
+    let silent = array.fields.is_empty() && columns != 1 && columns != 3 && !(columns == 4 && quaternion);
+    axes.iter()
+        .map(|name| {
+            let mut head = Head::parse(name);
+            if let Some(unit) = &array.unit {
+                head.set_unit_below(unit);
+            }
+            head.silent = silent;
+            head
+        })
+        .collect()
+}
+
+impl Source for ArraySource {
+    fn format(&self) -> &'static str {
+        self.file.format()
+    }
+    fn topics(&self) -> &[Topic] {
+        &self.topics
+    }
+    fn table(mut self: Box<Self>, topic: usize) -> Result<Box<dyn Table + Send>, InputError> {
+        Ok(Box::new(ArrayTable {
+            path: self.path,
+            rate: rate(self.file.scalars()),
+            file: self.file,
+            topic: self.topics.swap_remove(topic),
+            places: self.places.swap_remove(topic),
+            time: None,
+            axes: Vec::new(),
+            loaded: None,
+            next: 0,
+        }))
+    }
+}
+
+/// The sample rate in Hz, if a number of the file is called so.
+fn rate(scalars: &[(String, f64)]) -> Option<(String, f64)> {
+    const NAMES: [&str; 9] = [
+        "samplingrate",
+        "samplerate",
+        "samplingfrequency",
+        "samplefrequency",
+        "samplingratehz",
+        "sampleratehz",
+        "ratehz",
+        "fs",
+        "fshz",
+    ];
+    scalars.iter().find_map(|(path, value)| {
+        let name = path.rsplit(['/', '.']).next().unwrap_or(path);
+        let plain: String = name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect();
+        (NAMES.contains(&plain.as_str()) && value.is_finite() && *value > 0.0).then(|| (path.clone(), *value))
+    })
+}
+
+/// The selected columns of one table, in memory: the arrays of such files are compressed as a whole.
+struct ArrayTable {
+    path: PathBuf,
+    file: Box<dyn ArrayFile>,
+    topic: Topic,
+    places: Vec<Place>,
+    rate: Option<(String, f64)>,
+    time: Option<usize>,
+    /// The axes and what is beside them.
+    axes: Vec<usize>,
+    loaded: Option<Loaded>,
+    next: usize,
+}
+
+#[derive(Default)]
+struct Loaded {
+    /// First stamp, whole and fraction.
+    origin: Split,
+    /// Since then.
+    time: Vec<f64>,
+    values: Vec<Vec<f64>>,
+}
+
+impl ArrayTable {
+    fn load(&mut self) -> Result<Loaded, InputError> {
+        let rows = self.topic.rows.unwrap_or(0) as usize;
+        let mut loaded = Loaded::default();
+        let time = self.time.map(|column| self.places[column]);
+        let wanted: Vec<Place> = self.axes.iter().map(|&column| self.places[column]).collect();
+        let mut arrays: Vec<usize> = wanted.iter().chain(&time).map(|place| place.array).collect();
+        arrays.sort_unstable();
+        arrays.dedup();
+        let mut first: Option<(u64, Split)> = None;
+        let mut stamps: Vec<Split> = Vec::new();
+        loaded.values.resize_with(wanted.len(), Vec::new);
+        for array in arrays {
+            let here: Vec<(usize, Place)> =
+                wanted.iter().copied().enumerate().filter(|(_, place)| place.array == array).collect();
+            let stamp = time.filter(|place| place.array == array);
+            let (values, stamps) = (&mut loaded.values, &mut stamps);
+            self.file.load(array, &mut |row, column, number| {
+                let at = |place: &Place| {
+                    let (row, column) = if place.across { (column, row) } else { (row, column) };
+                    (column == place.column && row < rows as u64).then_some(row as usize)
+                };
+                for (axis, place) in &here {
+                    if let Some(row) = at(place) {
+                        let column = &mut values[*axis];
+                        if column.len() <= row {
+                            column.resize(row + 1, f64::NAN); // as far as numbers are there, not as far as promised
+                        }
+                        let x = number.0 as f64 + number.1;
+                        column[row] = if x.is_finite() { x } else { f64::NAN };
+                    }
+                }
+                if let Some(row) = stamp.as_ref().and_then(at) {
+                    if stamps.len() <= row {
+                        stamps.resize(row + 1, (0, f64::NAN));
+                    }
+                    stamps[row] = number;
+                    if number.1.is_finite() && first.is_none_or(|(earliest, _)| (row as u64) < earliest) {
+                        first = Some((row as u64, number));
+                    }
+                }
+            })?;
+        }
+        loaded.origin = first.map_or((0, 0.0), |(_, stamp)| stamp);
+        let origin = loaded.origin;
+        loaded.time = stamps.iter().map(|(whole, part)| (whole - origin.0) as f64 + (part - origin.1)).collect();
+        let short =
+            loaded.values.iter().any(|column| column.len() != rows) || (time.is_some() && loaded.time.len() != rows);
+        if short {
+            return Err(InputError {
+                message: format!("{}: truncated: an array holds fewer numbers than it declares", self.path.display()),
+            });
+        }
+        Ok(loaded)
+    }
+}
+
+impl Table for ArrayTable {
+    fn heads(&self) -> Vec<&Head> {
+        self.topic.heads.iter().collect()
+    }
+    fn named(&self) -> bool {
+        true
+    }
+    fn place(&self) -> String {
+        self.path.display().to_string()
+    }
+    fn row_place(&self, row: u64) -> String {
+        format!("{}: row {row}", self.path.display())
+    }
+    /// What an array declares is not yet there.
+    fn rows(&self) -> Option<u64> {
+        None
+    }
+    fn rate(&self) -> Option<(String, f64)> {
+        self.rate.clone()
+    }
+    fn select(&mut self, time: Option<usize>, axes: &[usize], beside: Option<usize>) {
+        self.time = time;
+        self.axes = axes.iter().copied().chain(beside).collect();
+        self.loaded = None;
+    }
+    fn rewind(&mut self) -> Result<(), InputError> {
+        self.next = 0;
+        Ok(())
+    }
+    fn origin(&self) -> f64 {
+        self.loaded.as_ref().map_or(0.0, |loaded| loaded.origin.0 as f64 + loaded.origin.1)
+    }
+    fn next_rows(&mut self, rows: &mut Rows) -> Result<bool, InputError> {
+        rows.clear(self.axes.len());
+        if self.loaded.is_none() {
+            self.loaded = Some(self.load()?);
+        }
+        let Some(loaded) = &self.loaded else { return Ok(false) };
+        let end = (self.next + BLOCK).min(self.topic.rows.unwrap_or(0) as usize);
+        let range = self.next..end;
+        self.next = end;
+        for (out, column) in rows.values.iter_mut().zip(&loaded.values) {
+            out.extend_from_slice(&column[range.clone()]);
+        }
+        if self.time.is_some() {
+            rows.time.extend_from_slice(&loaded.time[range.clone()]);
+        }
+        rows.lines.extend(range.clone().map(|row| row as u64 + 1));
+        Ok(!range.is_empty())
+    }
+}

@@ -1,0 +1,302 @@
+//! MATLAB files of level 5 (`save -v6`, `-v7`): numeric arrays, also inside structures.
+//!
+//! Format: MathWorks, "MAT-File Format", chapter 1. Opening inflates no more of a variable than its name and shape; numbers
+//! are read when they are selected, straight into the columns. Cells, text, sparse and complex matrices and objects are passed over.
+
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+use flate2::bufread::ZlibDecoder;
+
+use super::InputError;
+use super::arrays::{Array, ArrayFile, Put};
+use super::number::{Kind, Number};
+
+pub(super) const SIGNATURE: &[u8] = b"MATLAB 5.0 MAT-file";
+
+const HEADER: u64 = 128;
+const MATRIX: u32 = 14;
+const COMPRESSED: u32 = 15;
+const DEEPEST: usize = 8;
+const MOST_ARRAYS: usize = 10_000;
+/// Names and shapes are shorter.
+const LONGEST_NAME: u32 = 1 << 20;
+
+pub(super) struct Mat {
+    path: PathBuf,
+    arrays: Vec<Array>,
+    /// Per array: its variable, and how many arrays of the variable come before it.
+    places: Vec<(Variable, usize)>,
+    scalars: Vec<(String, f64)>,
+    big_endian: bool,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Variable {
+    start: u64,
+    size: u32,
+    compressed: bool,
+}
+
+/// One array as it is met: rows and columns, how its numbers are stored, and the numbers.
+struct Met<'a> {
+    path: &'a str,
+    rows: u64,
+    columns: u64,
+    number: Number,
+    numbers: &'a mut dyn Read,
+}
+
+type Visit<'a> = dyn FnMut(Met) -> io::Result<()> + 'a;
+
+fn bad(what: &str) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidData, what)
+}
+
+impl Mat {
+    pub(super) fn open(path: &Path) -> Result<Mat, InputError> {
+        let (arrays, places, scalars) = (Vec::new(), Vec::new(), Vec::new());
+        let mut mat = Mat { path: path.to_path_buf(), arrays, places, scalars, big_endian: false };
+        match mat.index() {
+            Ok(()) => Ok(mat),
+            Err(error) => mat.fail(&error),
+        }
+    }
+
+    fn fail<T>(&self, error: &io::Error) -> Result<T, InputError> {
+        let what = match error.kind() {
+            io::ErrorKind::UnexpectedEof => "truncated: the file ends inside a variable".into(),
+            io::ErrorKind::InvalidData | io::ErrorKind::InvalidInput => format!("damaged: {error}"),
+            _ => format!("cannot read: {error}"),
+        };
+        Err(InputError { message: format!("{}: {what}", self.path.display()) })
+    }
+
+    /// Finds all variables.
+    fn index(&mut self) -> io::Result<()> {
+        let mut file = BufReader::new(File::open(&self.path)?);
+        let length = file.get_ref().metadata()?.len();
+        let mut header = [0; HEADER as usize];
+        file.read_exact(&mut header)?;
+        self.big_endian = match &header[126..] {
+            b"IM" => false,
+            b"MI" => true,
+            _ => return Err(bad("the header does not say the byte order")),
+        };
+        let mut at = HEADER;
+        while at < length {
+            file.seek(SeekFrom::Start(at))?;
+            let (kind, size) = (self.word(&mut file)?, self.word(&mut file)?);
+            let variable = Variable { start: at + 8, size, compressed: kind == COMPRESSED };
+            at += 8 + u64::from(size);
+            if at > length {
+                return Err(io::ErrorKind::UnexpectedEof.into());
+            }
+            if kind == MATRIX || kind == COMPRESSED {
+                let (arrays, places, scalars) = (&mut self.arrays, &mut self.places, &mut self.scalars);
+                let mut count = 0;
+                walk(&mut file, variable, self.big_endian, &mut |met| {
+                    if met.rows.checked_mul(met.columns) == Some(1) {
+                        let mut bytes = [0; 8];
+                        met.numbers.read_exact(&mut bytes[..met.number.size()])?;
+                        let (whole, part) = met.number.decode(&bytes);
+                        scalars.push((met.path.to_string(), whole as f64 + part));
+                    }
+                    if arrays.len() == MOST_ARRAYS {
+                        return Err(bad("more than 10,000 arrays"));
+                    }
+                    let (rows, columns) = (met.rows, met.columns);
+                    arrays.push(Array { path: met.path.into(), rows, columns, unit: None, fields: Vec::new() });
+                    places.push((variable, count));
+                    count += 1;
+                    Ok(())
+                })?;
+            }
+        }
+        Ok(())
+    }
+
+    fn word(&self, from: &mut dyn Read) -> io::Result<u32> {
+        word(from, self.big_endian)
+    }
+}
+
+impl ArrayFile for Mat {
+    fn format(&self) -> &'static str {
+        "MATLAB file"
+    }
+    fn arrays(&self) -> &[Array] {
+        &self.arrays
+    }
+    fn scalars(&self) -> &[(String, f64)] {
+        &self.scalars
+    }
+    fn load(&mut self, array: usize, put: &mut Put) -> Result<(), InputError> {
+        let (variable, wanted) = self.places[array];
+        let rows = self.arrays[array].rows;
+        let mut count = 0;
+        let mut visit = |met: Met| {
+            count += 1;
+            if count - 1 != wanted {
+                return Ok(());
+            }
+            let size = met.number.size();
+            let mut buffer = vec![0; size << 12];
+            let (mut index, all) = (0, met.rows * met.columns);
+            while index < all {
+                let numbers = (all - index).min(1 << 12);
+                let bytes = &mut buffer[..numbers as usize * size];
+                met.numbers.read_exact(bytes)?;
+                for number in bytes.chunks_exact(size) {
+                    put(index % rows, index / rows, met.number.decode(number));
+                    index += 1;
+                }
+            }
+            Ok(())
+        };
+        let read = File::open(&self.path)
+            .and_then(|file| walk(&mut BufReader::new(file), variable, self.big_endian, &mut visit));
+        read.or_else(|error| self.fail(&error))
+    }
+}
+
+fn word(from: &mut dyn Read, big_endian: bool) -> io::Result<u32> {
+    let mut bytes = [0; 4];
+    from.read_exact(&mut bytes)?;
+    Ok(if big_endian { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) })
+}
+
+/// Visits the arrays of one variable of the file.
+fn walk(file: &mut BufReader<File>, variable: Variable, big_endian: bool, visit: &mut Visit) -> io::Result<()> {
+    file.seek(SeekFrom::Start(variable.start))?;
+    let mut walker = Walker { big_endian, visit };
+    let mut stored = file.take(u64::from(variable.size));
+    if !variable.compressed {
+        return walker.matrix(&mut stored, "", 0);
+    }
+    let mut inflated = ZlibDecoder::new(stored);
+    match (word(&mut inflated, big_endian)?, word(&mut inflated, big_endian)?) {
+        (MATRIX, size) => walker.matrix(&mut (&mut inflated as &mut dyn Read).take(u64::from(size)), "", 0),
+        _ => Ok(()),
+    }
+}
+
+struct Walker<'a> {
+    big_endian: bool,
+    visit: &'a mut Visit<'a>,
+}
+
+impl Walker<'_> {
+    /// Type and size of the element that follows, and its data if they are in the tag.
+    fn tag(&self, from: &mut dyn Read) -> io::Result<(u32, u32, Option<[u8; 4]>)> {
+        let first = word(from, self.big_endian)?;
+        if first >> 16 == 0 {
+            return Ok((first, word(from, self.big_endian)?, None));
+        }
+        let mut data = [0; 4];
+        from.read_exact(&mut data)?;
+        match first >> 16 {
+            size @ 1..=4 => Ok((first & 0xffff, size, Some(data))),
+            _ => Err(bad("an element of no known form")),
+        }
+    }
+
+    /// A whole element that is known to be short.
+    fn short(&self, from: &mut dyn Read) -> io::Result<Vec<u8>> {
+        let (_, size, inside) = self.tag(from)?;
+        if let Some(data) = inside {
+            return Ok(data[..size as usize].to_vec());
+        }
+        if size > LONGEST_NAME {
+            return Err(bad("a name or shape of over 1 MiB"));
+        }
+        let mut data = Vec::new();
+        from.take(u64::from(size)).read_to_end(&mut data)?;
+        let padding = (8 - size % 8) % 8;
+        let mut skipped = Vec::new();
+        from.take(u64::from(padding)).read_to_end(&mut skipped)?;
+        if data.len() != size as usize {
+            return Err(io::ErrorKind::UnexpectedEof.into());
+        }
+        Ok(data)
+    }
+
+    /// What is inside a matrix element. `outer`: path of the structure it is in, with what it is called there.
+    fn matrix(&mut self, from: &mut dyn Read, outer: &str, depth: usize) -> io::Result<()> {
+        const STRUCTURE: u8 = 2;
+        let flags = self.short(from)?;
+        let (class, complex) = match flags[..] {
+            [class, flags, ..] if !self.big_endian => (class, flags & 8 != 0),
+            [_, _, flags, class, ..] => (class, flags & 8 != 0),
+            _ => return Err(bad("a matrix without flags")),
+        };
+        let shape: Vec<u64> = self
+            .short(from)?
+            .chunks_exact(4)
+            .map(|b| [b[0], b[1], b[2], b[3]])
+            .map(|b| u64::from(if self.big_endian { u32::from_be_bytes(b) } else { u32::from_le_bytes(b) }))
+            .collect();
+        let name = self.short(from)?;
+        let path = if depth == 0 { String::from_utf8_lossy(&name).into_owned() } else { outer.to_string() };
+        let [rows, columns] = shape[..] else { return Ok(()) };
+        match class {
+            STRUCTURE if depth < DEEPEST => self.structure(from, &path, rows.saturating_mul(columns), depth),
+            6..=15 if !complex && rows > 0 && columns > 0 => self.numbers(from, &path, rows, columns),
+            _ => Ok(()),
+        }
+    }
+
+    fn structure(&mut self, from: &mut dyn Read, path: &str, count: u64, depth: usize) -> io::Result<()> {
+        let length = self.short(from)?;
+        let length = match length[..] {
+            [a, b, c, d] if self.big_endian => u32::from_be_bytes([a, b, c, d]),
+            [a, b, c, d] => u32::from_le_bytes([a, b, c, d]),
+            _ => return Err(bad("a structure without field names")),
+        };
+        let names = self.short(from)?;
+        let names: Vec<String> = names.chunks(length.max(1) as usize).map(super::bytes::Bytes::text).collect();
+        for element in 1..=count.min(MOST_ARRAYS as u64) {
+            for name in &names {
+                let inner = if count == 1 { format!("{path}.{name}") } else { format!("{path}({element}).{name}") };
+                let (kind, size, inside) = self.tag(from)?;
+                if inside.is_some() {
+                    continue;
+                }
+                let mut element = from.take(u64::from(size));
+                if kind == MATRIX && size > 0 {
+                    self.matrix(&mut element, &inner, depth + 1)?;
+                }
+                if io::copy(&mut element, &mut io::sink())? == 0 && element.limit() > 0 {
+                    return Err(io::ErrorKind::UnexpectedEof.into());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn numbers(&mut self, from: &mut dyn Read, path: &str, rows: u64, columns: u64) -> io::Result<()> {
+        let (kind, size, inside) = self.tag(from)?;
+        let kind = match kind {
+            1 => Kind::Signed(1),
+            2 => Kind::Unsigned(1),
+            3 => Kind::Signed(2),
+            4 => Kind::Unsigned(2),
+            5 => Kind::Signed(4),
+            6 => Kind::Unsigned(4),
+            7 => Kind::Float(4),
+            9 => Kind::Float(8),
+            12 => Kind::Signed(8),
+            13 => Kind::Unsigned(8),
+            _ => return Err(bad("numbers of no known type")),
+        };
+        let number = Number { kind, big_endian: self.big_endian };
+        if rows.checked_mul(columns).and_then(|n| n.checked_mul(number.size() as u64)) != Some(u64::from(size)) {
+            return Err(bad(&format!("'{path}' has {rows} x {columns} numbers but {size} bytes of them")));
+        }
+        match inside {
+            Some(data) => (self.visit)(Met { path, rows, columns, number, numbers: &mut &data[..] }),
+            None => (self.visit)(Met { path, rows, columns, number, numbers: from }),
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! The front door: what a file is by its content, the tables in it, and which of them is meant.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use super::names::Head;
+use super::{InputError, LogOptions, Table, arrays, columns, hdf5, mat, npy, text};
+use crate::units::Quantity;
+
+/// One table of a file: a message of a flight log, a topic of a bag, arrays of one length; a text log is one.
+#[derive(Clone, Debug)]
+pub(super) struct Topic {
+    pub(super) name: String,
+    /// Other names by which `--topic` finds it.
+    pub(super) aliases: Vec<String>,
+    pub(super) heads: Vec<Head>,
+    /// False when the columns have only numbers.
+    pub(super) named: bool,
+    /// Where the file says it, or the reader has counted.
+    pub(super) rows: Option<u64>,
+    /// Of several with the sensor that is looked for, the highest is taken: output of a sensor before what was made of it.
+    pub(super) rank: u8,
+}
+
+/// An open file.
+pub(super) trait Source: Send {
+    /// "HDF5", "PX4 ULog".
+    fn format(&self) -> &'static str;
+    fn topics(&self) -> &[Topic];
+    fn table(self: Box<Self>, topic: usize) -> Result<Box<dyn Table + Send>, InputError>;
+}
+
+/// A file with one table.
+struct Single {
+    format: &'static str,
+    topic: [Topic; 1],
+    table: Box<dyn Table + Send>,
+}
+
+impl Single {
+    fn new(format: &'static str, table: Box<dyn Table + Send>) -> Single {
+        let heads = table.heads().into_iter().cloned().collect();
+        let (named, rows) = (table.named(), table.rows());
+        let topic = Topic { name: String::new(), aliases: Vec::new(), heads, named, rows, rank: 0 };
+        Single { format, topic: [topic], table }
+    }
+}
+
+impl Source for Single {
+    fn format(&self) -> &'static str {
+        self.format
+    }
+    fn topics(&self) -> &[Topic] {
+        &self.topic
+    }
+    fn table(self: Box<Self>, _: usize) -> Result<Box<dyn Table + Send>, InputError> {
+        Ok(self.table)
+    }
+}
+
+/// Opens a log of any format.
+pub(super) fn open(path: &Path) -> Result<Box<dyn Source>, InputError> {
+    let fail = |what: String| Err(InputError { message: format!("{}: {what}", path.display()) });
+    match std::fs::metadata(path) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return fail("there is no such file".into()),
+        Err(error) => return fail(format!("cannot read: {error}")),
+        Ok(found) if found.is_dir() => return fail("this is a folder, not a log".into()),
+        Ok(found) if !found.is_file() => return fail("a log is read more than once: save it to a file first".into()),
+        Ok(_) => {}
+    }
+    let mut start = Vec::new();
+    if let Err(error) = File::open(path).and_then(|file| file.take(4096).read_to_end(&mut start)) {
+        return fail(format!("cannot read: {error}"));
+    }
+    let npy = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy"));
+    if npy || start.starts_with(b"\x93NUMPY") {
+        return Ok(Box::new(Single::new("NumPy array", Box::new(npy::NpyTable::open(path)?))));
+    }
+    // a file may have a block of its user's before the signature: MATLAB 7.3 has 512 bytes of text
+    if [0, 512, 1024, 2048].iter().any(|&at| start.get(at..).is_some_and(|rest| rest.starts_with(hdf5::SIGNATURE))) {
+        return Ok(Box::new(arrays::ArraySource::new(path, Box::new(hdf5::Hdf5::open(path)?))?));
+    }
+    if start.starts_with(mat::SIGNATURE) {
+        return Ok(Box::new(arrays::ArraySource::new(path, Box::new(mat::Mat::open(path)?))?));
+    }
+    Ok(Box::new(Single::new("text", Box::new(text::TextTable::open(path)?))))
+}
+
+/// The table that is meant, and a sentence on which it is where others could be.
+pub(super) fn choose(
+    path: &Path,
+    source: Box<dyn Source>,
+    options: &LogOptions,
+) -> Result<(Box<dyn Table + Send>, Option<String>), InputError> {
+    let fail = |what: String| Err(InputError { message: format!("{}: {what}", path.display()) });
+    let topics = source.topics();
+    if let Some(wanted) = &options.topic {
+        let lower = wanted.trim().to_lowercase();
+        let is = |name: &String| *name == lower || name.strip_suffix(":0").is_some_and(|stem| stem == lower);
+        let named =
+            |topic: &Topic| [&topic.name].into_iter().chain(&topic.aliases).any(|name| is(&name.to_lowercase()));
+        return match topics.iter().position(named) {
+            Some(topic) => Ok((source.table(topic)?, None)),
+            None if topics.len() == 1 && topics[0].name.is_empty() => {
+                fail(format!("--topic {wanted}: this is {} with one table; drop the flag", source.format()))
+            }
+            None => fail(format!("no topic '{wanted}'; {}", there_are(topics))),
+        };
+    }
+    if topics.len() == 1 {
+        return Ok((source.table(0)?, None));
+    }
+    let quantities: &[Quantity] = match options.sought() {
+        Some(Quantity::AngularRate) => &[Quantity::AngularRate],
+        Some(Quantity::SpecificForce) => &[Quantity::SpecificForce],
+        None => &[Quantity::AngularRate, Quantity::SpecificForce],
+    };
+    for quantity in quantities {
+        let has = |topic: &Topic| {
+            let heads: Vec<&Head> = topic.heads.iter().collect();
+            let table = columns::Table { heads: &heads, named: topic.named, place: "", rate_hz: None };
+            match &options.columns {
+                Some(list) => list.iter().all(|name| name.parse::<usize>().is_err() && table.find(name).is_ok()),
+                None => table.has(*quantity, options),
+            }
+        };
+        let mut hits: Vec<usize> = (0..topics.len()).filter(|&i| has(&topics[i])).collect();
+        // of equals the one that stands first
+        hits.sort_by_key(|&i| std::cmp::Reverse((topics[i].rank, topics[i].rows)));
+        if let Some((&taken, others)) = hits.split_first() {
+            let name = |i: usize| match topics[i].rows {
+                Some(rows) => format!("{} ({rows} rows)", topics[i].name),
+                None => topics[i].name.clone(),
+            };
+            let others: Vec<String> = others.iter().map(|&i| name(i)).collect();
+            let note = (!others.is_empty())
+                .then(|| format!("topic {} is read; --topic chooses another: {}", name(taken), others.join(", ")));
+            return Ok((source.table(taken)?, note));
+        }
+    }
+    let wanted = match (&options.columns, quantities) {
+        (Some(list), _) => format!("no topic has the columns {}", list.join(",")),
+        (None, [Quantity::AngularRate]) => "no topic has a gyro known by its name or unit".into(),
+        (None, [Quantity::SpecificForce]) => "no topic has an accelerometer known by its name or unit".into(),
+        _ => "no topic has a gyro or an accelerometer known by its name or unit".into(),
+    };
+    fail(format!("{wanted}; choose with --topic and --columns; {}", there_are(topics)))
+}
+
+/// `there are gps (100 rows: 1 'lat', 2 'lon'), …`
+fn there_are(topics: &[Topic]) -> String {
+    const MOST: usize = 40;
+    let columns = |topic: &Topic| {
+        let names: Vec<&str> = topic.heads.iter().take(12).map(|head| head.full.as_str()).collect();
+        let more = if topic.heads.len() > names.len() { " …" } else { "" };
+        format!("{}{more}", names.join(" "))
+    };
+    let one = |topic: &Topic| match topic.rows {
+        Some(rows) => format!("{} ({rows} rows: {})", topic.name, columns(topic)),
+        None => format!("{} ({})", topic.name, columns(topic)),
+    };
+    let mut list: Vec<String> = topics.iter().take(MOST).map(one).collect();
+    if topics.len() > MOST {
+        list.push(format!("… {} in all", topics.len()));
+    }
+    format!("there are {}", list.join(", "))
+}

@@ -4,6 +4,7 @@
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "the command line is the one place that prints")]
 
+mod aid_columns;
 pub mod allan;
 mod allan_figure;
 pub mod compare;

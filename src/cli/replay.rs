@@ -2,13 +2,13 @@
 
 mod sight;
 
-use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::PathBuf;
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 
 use super::Status;
+use super::aid_columns::aid_columns;
 use super::log_flags::{LogFlags, print_check};
 use super::output::{digits, print_json, print_text, progress, shown_unit, table};
 use super::tests_table::{TESTS, caption, rows};
@@ -16,8 +16,8 @@ use crate::consistency::Verdict;
 use crate::export::atomic::{AtomicFile, refuse_input_as_output};
 use crate::export::table::TableWriter;
 use crate::filter::FilterDesign;
-use crate::input::{Block, ExtraColumn, LogOptions, LogReader};
-use crate::replay::{AxisResult, Estimates, LogShape, Options, ReplayResult, Replayer, aids};
+use crate::input::{Block, LogOptions, LogReader};
+use crate::replay::{AxisResult, Estimates, LogShape, Options, ReplayResult, Replayer};
 use crate::units::{Quantity, Unit};
 
 /// A recorded log through filter.json, with a verdict
@@ -113,52 +113,6 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         Verdict::Inconsistent => Status::CheckFailed,
         Verdict::Consistent | Verdict::Inconclusive => Status::Done,
     })
-}
-
-/// The extra columns of the log, in the order of [`aids`].
-fn aid_columns(flags: &[String], design: &FilterDesign) -> anyhow::Result<Vec<ExtraColumn>> {
-    let needed = aids(design)?;
-    let mut given: Vec<(&str, Vec<&str>)> = Vec::new();
-    for flag in flags {
-        let (name, columns) = flag.split_once('=').with_context(|| format!("--aid {flag}: expected NAME=COLUMN"))?;
-        let (name, columns) = (name.trim(), columns.split(',').map(str::trim).collect::<Vec<_>>());
-        let axes = needed.iter().filter(|aid| aid.measurement.name == name).count();
-        if axes == 0 {
-            let known: BTreeSet<&str> = needed.iter().map(|aid| aid.measurement.name.as_str()).collect();
-            let known = if known.is_empty() { "none".into() } else { known.into_iter().collect::<Vec<_>>().join(", ") };
-            bail!("--aid {flag}: the filter has no measurement '{name}' beside the sensor; it has {known}");
-        }
-        if given.iter().any(|(known, _)| *known == name) {
-            bail!("--aid {flag}: '{name}' is given twice");
-        }
-        if columns.len() != axes {
-            bail!(
-                "--aid {flag}: {} columns for {axes} axes; expected one per axis of the filter, in its order",
-                columns.len()
-            );
-        }
-        given.push((name, columns));
-    }
-    let mut taken = vec![0; given.len()];
-    let mut extra = Vec::with_capacity(needed.len());
-    for aid in &needed {
-        let measurement = &aid.measurement;
-        let Some(at) = given.iter().position(|(name, _)| *name == measurement.name) else {
-            bail!(
-                "the filter measures {} beside the sensor; say which column that is, --aid {0}=COLUMN",
-                measurement.name
-            );
-        };
-        let text = given[at].1[taken[at]];
-        taken[at] += 1;
-        // a unit behind the last colon, unless the name itself has it
-        let unit = text.rsplit_once(':').and_then(|(column, unit)| Some((column, Unit::parse(unit).ok()?)));
-        let (column, unit) = unit.map_or((text, None), |(column, unit)| (column, Some(unit)));
-        let dimension = Unit::parse(&measurement.unit).with_context(|| measurement.name.clone())?.dimension();
-        let flag = format!("--aid {}={column}", measurement.name);
-        extra.push(ExtraColumn { column: column.to_string(), unit, dimension, flag });
-    }
-    Ok(extra)
 }
 
 /// One line on stderr for an aid that comes at another rate than the filter was made for.

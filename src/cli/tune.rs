@@ -1,5 +1,8 @@
 //! `kfdesign tune`.
 
+mod compare;
+mod logs;
+mod objective;
 mod plant_flags;
 mod sight;
 mod text;
@@ -7,20 +10,22 @@ mod truth;
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use serde::Serialize;
 use serde_json::json;
 
+use self::logs::Reading;
+use self::objective::{ObjectiveArg, ObjectiveFlags};
 use self::plant_flags::PlantFlags;
 use super::Status;
-use super::log_flags::{LogFlags, print_check};
+use super::log_flags::LogFlags;
 use super::output::{print_json, print_text, progress};
 use crate::consistency::Verdict;
 use crate::export::atomic;
-use crate::input::{Block, LogReader};
 use crate::montecarlo::{Outcome, Plan, verify};
 use crate::params::Params;
-use crate::replay::{LogShape, Options, ReplayResult, Replayer};
+use crate::replay::ReplayResult;
+use crate::tune::objective::{Objective, Record, Request, tune_by};
 use crate::tune::{AxisReport, TuneOptions, Tuned, UnderTruth, tune, under_truth};
 
 /// The augmented Kalman filter from params.json
@@ -31,7 +36,8 @@ use crate::tune::{AxisReport, TuneOptions, Tuned, UnderTruth, tune, under_truth}
 #[command(after_help = "Example: kfdesign tune data/params.json -o filter.json --report design.html")]
 pub struct Args {
     /// Noise parameters
-    params: PathBuf,
+    #[arg(required_unless_present = "compare")]
+    params: Option<PathBuf>,
     /// The design: filter.json
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -47,9 +53,9 @@ pub struct Args {
     /// Seed of the Monte Carlo
     #[arg(long, default_value_t = 1, value_name = "N")]
     seed: u64,
-    /// Also replay this log through the design
-    #[arg(long, value_name = "LOG")]
-    log: Option<PathBuf>,
+    /// Also replay these logs through the design; the objectives likelihood and als choose the parameters on them
+    #[arg(long, num_args = 1.., value_name = "LOG")]
+    log: Vec<PathBuf>,
     /// One HTML page with tables and figures
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
@@ -59,6 +65,8 @@ pub struct Args {
     /// One JSON document on stdout: the filter, the reports, the verification, and what --truth and --log gave
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    choosing: ObjectiveFlags,
     #[command(flatten)]
     plant: PlantFlags,
     #[command(flatten)]
@@ -73,20 +81,29 @@ struct Printed<'a> {
     verification: &'a Outcome,
     #[serde(skip_serializing_if = "Option::is_none")]
     under_truth: Option<&'a [UnderTruth]>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    replay: Option<&'a ReplayResult>,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    replay: &'a [ReplayResult],
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
+    let reading = Reading { flags: &args.reading, aids: &args.plant.columns() };
+    let params_path = match &args.params {
+        Some(path) if args.choosing.compare.is_empty() => path,
+        Some(path) => bail!("--compare ranks designs and makes none: leave out {}", path.display()),
+        None => {
+            let options = TuneOptions { design: None, flicker_horizon_s: args.flicker_horizon };
+            return compare::run(&args.choosing.compare, args.choosing.held_out, args.json, &options, &reading);
+        }
+    };
     for output in [&args.output, &args.report, &args.plot].into_iter().flatten() {
-        for input in std::iter::once(&args.params).chain(&args.log).chain(&args.truth) {
+        for input in std::iter::once(params_path).chain(&args.log).chain(&args.truth) {
             atomic::check_output(output, input)?;
         }
     }
-    let params = Params::read(&args.params)?;
-    let name = args.params.display().to_string();
+    let params = Params::read(params_path)?;
+    let name = params_path.display().to_string();
     let options = TuneOptions { design: args.plant.design(&params)?, flicker_horizon_s: args.flicker_horizon };
-    let mut tuned = tune(&params, &options).with_context(|| name.clone())?;
+    let (mut tuned, record) = chosen(args, &params, &options, &reading).with_context(|| name.clone())?;
     let truth = args.truth.as_deref().map(|path| Truth::read(path, &tuned, &options)).transpose()?;
     let plan = Plan { runs: args.runs, seed: args.seed, ..Plan::quick(params.sample_rate_hz) };
     let bar = progress(plan.runs * tuned.design.axes.len() as u64, "verify");
@@ -99,18 +116,21 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         });
         record.insert("verification".into(), summary);
     }
-    let verified = verification.verdict == Verdict::Consistent;
+    let kept = record.iter().flat_map(|record| &record.robust).all(|axis| axis.met);
+    let verified = verification.verdict == Verdict::Consistent && kept;
     if let (Some(output), true) = (&args.output, verified) {
         atomic::write(output, tuned.design.to_json().as_bytes())?;
     }
-    let replay = args.log.as_deref().map(|log| replay(args, &tuned, log)).transpose()?;
+    let replays = args.log.iter().map(|log| reading.replay(log, &tuned.design)).collect::<anyhow::Result<Vec<_>>>()?;
     let view =
         text::View { name: &name, params: &params, tuned: &tuned, verification: &verification, truth: truth.as_ref() };
     if let Some(path) = &args.plot {
         atomic::write(path, sight::sheet(&view).as_bytes())?;
     }
     if let Some(path) = &args.report {
-        atomic::write(path, sight::page(&view, replay.as_ref()).to_html()?.as_bytes())?;
+        let mut page = sight::page(&view, &replays);
+        page.sections.splice(0..0, record.iter().map(|record| objective::section(record, &params)));
+        atomic::write(path, page.to_html()?.as_bytes())?;
     }
     if args.json {
         let filter = serde_json::from_str(&tuned.design.to_json())?;
@@ -119,19 +139,18 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
             reports: &tuned.reports,
             verification: &verification,
             under_truth: truth.as_ref().map(|t| t.axes.as_slice()),
-            replay: replay.as_ref(),
+            replay: &replays,
         })?;
     } else {
-        let mut printed = text::design(&view);
-        if let Some(result) = &replay {
-            printed.push_str(&text::replay(result));
-        }
+        let mut printed = record.as_ref().map_or_else(String::new, |record| objective::text(record, &params));
+        printed.push_str(&text::design(&view));
+        replays.iter().for_each(|result| printed.push_str(&text::replay(result)));
         if let Some(output) = &args.output {
             printed.push_str(&written(output, verified));
         }
         print_text(&printed)?;
     }
-    let contradicted = replay.is_some_and(|r| r.verdict == Verdict::Inconsistent);
+    let contradicted = replays.iter().any(|r| r.verdict == Verdict::Inconsistent);
     Ok(if verified && !contradicted { Status::Done } else { Status::CheckFailed })
 }
 
@@ -157,27 +176,38 @@ fn written(output: &Path, verified: bool) -> String {
     }
 }
 
-/// The log through the design; only the verdict is wanted.
-fn replay(args: &Args, tuned: &Tuned, log: &Path) -> anyhow::Result<ReplayResult> {
-    let mut reader = LogReader::open(log, &args.reading.options()?)?;
-    let name = log.display().to_string();
-    print_check(&name, reader.check());
-    let shape = LogShape {
-        axes: reader.axes().iter().map(|a| a.name.clone()).collect(),
-        quantity: reader.quantity(),
-        sample_rate_hz: reader.check().sample_rate_hz,
-        aids: 0,
-    };
-    let mut replayer = Replayer::new(&tuned.design, &shape, Options::default()).with_context(|| name.clone())?;
-    let mut block = Block::default();
-    let bar = progress(reader.check().samples, "replay");
-    while reader.next_block(&mut block)? {
-        replayer.push(&block, None);
-        bar.inc(block.time_s.len() as u64);
+/// The design with its parameters chosen as asked, and how they were.
+fn chosen(
+    args: &Args,
+    params: &Params,
+    options: &TuneOptions,
+    reading: &Reading<'_>,
+) -> anyhow::Result<(Tuned, Option<Record>)> {
+    let flags = &args.choosing;
+    let truth = args.truth.as_deref().filter(|_| flags.objective.objective() == Objective::Nees);
+    let truth = truth.map(Params::read).transpose()?;
+    let mut logs = Vec::new();
+    if flags.objective.needs_logs() {
+        let nominal = tune(params, options)?;
+        let own = params.source.as_ref().and_then(|source| source.sha256.clone());
+        for log in &args.log {
+            let (read, sha256) = reading.read(log, &nominal.design)?;
+            if flags.objective == ObjectiveArg::Likelihood && !flags.no_prior && own.as_ref() == Some(&sha256) {
+                eprintln!(
+                    "  warning: the intervals come from this log, which now counts twice; give another one, or --no-prior"
+                );
+            }
+            logs.push(read);
+        }
     }
-    bar.finish_and_clear();
-    let mut result = replayer.finish();
-    result.log = Some(name);
-    result.log_sha256 = Some(reader.sha256().to_string());
-    Ok(result)
+    let request = Request {
+        objective: flags.objective.objective(),
+        hold: &flags.hold,
+        truth: truth.as_ref(),
+        logs: &logs,
+        held_out: flags.held_out,
+        priors: !flags.no_prior,
+        seed: args.seed,
+    };
+    Ok(tune_by(params, options, &request)?)
 }

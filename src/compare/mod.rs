@@ -2,9 +2,10 @@
 //!
 //! `curve` holds the Allan curve against the envelope that the model draws around its own, `spectrum` the spectrum in bands and as a whole,
 //! `innovations` what the model's filter leaves, `means` shows why equal means prove nothing; `inflation` measures the factor between a
-//! bench log's wideband noise and that of a vehicle that vibrates.
+//! bench log's wideband noise and that of a vehicle that vibrates; `designs` ranks filters on logs.
 
 mod curve;
+pub mod designs;
 pub mod inflation;
 mod innovations;
 mod means;

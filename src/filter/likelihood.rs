@@ -1,4 +1,4 @@
-//! Exact Gaussian likelihood of a log whose constant bias (and slope) is unknown, gaps included.
+//! Exact Gaussian likelihood of a log whose constant bias (and slope) is unknown or known to some precision, gaps included.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -38,7 +38,18 @@ const SETTLED: f64 = 4.0 * f64::EPSILON;
 /// The filter predicts over missing samples and over samples that are not finite. Units: SI. NaN when nothing can be said (fewer usable samples
 /// than unknowns). Sources: Rosenberg 1973; Durbin & Koopman 2012, sections 5.6 and 7.2.
 pub fn diffuse_log_likelihood(model: &LinearModel, log: &[Stretch<'_>], slope: bool) -> LogLikelihood {
+    likelihood(model, log, slope, None)
+}
+
+/// The same with b ~ N(mean, variance) and no slope: A has 1/variance more and ln L has −½ ln variance, the likelihood of a filter with a
+/// constant state for b. `bias` and its variance are those after the log.
+pub fn log_likelihood_with_bias(model: &LinearModel, log: &[Stretch<'_>], mean: f64, variance: f64) -> LogLikelihood {
+    likelihood(model, log, false, Some([mean, variance]))
+}
+
+fn likelihood(model: &LinearModel, log: &[Stretch<'_>], slope: bool, prior: Option<[f64; 2]>) -> LogLikelihood {
     let n = model.x0.len();
+    let mean = prior.map_or(0.0, |[mean, _]| mean);
     let columns = 2 + usize::from(slope);
     let total: u64 = log.iter().map(|part| part.missing + part.samples.len() as u64).sum();
     let mut run = Run {
@@ -63,7 +74,7 @@ pub fn diffuse_log_likelihood(model: &LinearModel, log: &[Stretch<'_>], slope: b
         run.pause(part.missing, step == 0);
         step += part.missing;
         for block in part.samples.chunks(BLOCK) {
-            data[0][..block.len()].copy_from_slice(block);
+            data[0].iter_mut().zip(block).for_each(|(out, z)| *out = z - mean);
             if slope {
                 let times = data[2].iter_mut().zip(step..);
                 times.for_each(|(t, k)| *t = (k as f64 - middle) * model.dt);
@@ -72,7 +83,7 @@ pub fn diffuse_log_likelihood(model: &LinearModel, log: &[Stretch<'_>], slope: b
             step += block.len() as u64;
         }
     }
-    run.conclude()
+    run.conclude(prior)
 }
 
 struct Run {
@@ -199,11 +210,15 @@ impl Run {
         self.count += (to - from) as u64;
     }
 
-    fn conclude(self) -> LogLikelihood {
+    fn conclude(mut self, prior: Option<[f64; 2]>) -> LogLikelihood {
         let unknowns = self.sums.nrows() - 1;
         let nothing = LogLikelihood { value: f64::NAN, bias: f64::NAN, bias_variance: f64::NAN };
         if self.count <= unknowns as u64 {
             return nothing;
+        }
+        let [mean, variance] = prior.unwrap_or([0.0, 1.0]);
+        if prior.is_some() {
+            self.sums[(1, 1)] += 1.0 / variance;
         }
         let information = self.sums.view((1, 1), (unknowns, unknowns)).into_owned();
         // a bias and a slope differ in unit
@@ -217,8 +232,8 @@ impl Run {
             2.0 * factor.l().diagonal().iter().zip(scale.iter()).map(|(l, s)| (l / s).ln()).sum::<f64>();
         let constant = self.count as f64 * std::f64::consts::TAU.ln();
         LogLikelihood {
-            value: -0.5 * (constant + self.log_variance + rest + log_determinant),
-            bias: solved[0] * scale[0],
+            value: -0.5 * (constant + self.log_variance + rest + log_determinant + variance.ln()),
+            bias: mean + solved[0] * scale[0],
             bias_variance: factor.inverse()[(0, 0)] * scale[0] * scale[0],
         }
     }

@@ -4,12 +4,16 @@
 //! moments follow from a linear recursion. Source: Brown and Hwang 2012, section 5.6 (suboptimal analysis);
 //! Gelb 1974, section 7.2 (sensitivity of the error covariance to a wrong model).
 
+mod settled;
+
 use nalgebra::{DMatrix, DVector, DVectorView};
 
 use super::gains::GainSequence;
 use super::judge::Judge;
 use crate::model::LinearModel;
 use crate::numerics::linalg::{cholesky, symmetrise};
+
+pub use settled::{Settled, expect_settled};
 
 /// What a filter does on average when the world is the truth.
 #[derive(Clone, Debug, PartialEq)]

@@ -18,6 +18,7 @@ macro_rules! for_size {
 pub mod cycle;
 pub mod document;
 pub mod gains;
+pub mod innovations;
 pub mod judge;
 pub mod kalman;
 pub mod likelihood;
@@ -32,6 +33,7 @@ mod transition;
 pub use cycle::Cycle;
 pub use document::{AxisDesign, FilterDesign, FilterError};
 pub use gains::GainSequence;
+pub use innovations::SensorLog;
 pub use judge::Judge;
 pub use kalman::Kalman;
 pub use square_root::SquareRoot;

@@ -89,6 +89,22 @@ impl LinearModel {
         DMatrix::from_fn(1, self.states.len(), |_, j| if noise(j) { 0.0 } else { self.h[(0, j)] })
     }
 
+    /// The states `kept` alone, without outputs.
+    pub fn part(&self, kept: &[usize]) -> LinearModel {
+        let block = |a: &DMatrix<f64>| a.select_rows(kept).select_columns(kept);
+        LinearModel {
+            states: kept.iter().map(|&i| self.states[i].clone()).collect(),
+            outputs: Vec::new(),
+            f: block(&self.f),
+            g: self.g.select_rows(kept),
+            h: self.h.select_columns(kept),
+            q: block(&self.q),
+            x0: self.x0.select_rows(kept),
+            p0: block(&self.p0),
+            ..self.clone()
+        }
+    }
+
     /// Checks that names are unique, shapes fit, numbers are finite, Q and P0 are symmetric positive semidefinite and
     /// R is diagonal and positive (measurements are taken one at a time).
     ///

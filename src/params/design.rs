@@ -184,6 +184,32 @@ impl Design {
         Ok(Design { plant, aids })
     }
 
+    /// Every noise parameter of the plant and its aids with its path: `motion.std_dev`, `accelerometer.white.density`,
+    /// `heading.gauss_markov.correlation_time`. Rates are not among them.
+    pub fn noise_parameters(&mut self) -> impl Iterator<Item = (String, &mut Measured)> {
+        let plant: Vec<(String, &mut Measured)> = match &mut self.plant {
+            PlantEntry::Rate { motion: MotionEntry::GaussMarkov { std_dev, correlation_time }, .. } => {
+                vec![("motion.std_dev".into(), std_dev), ("motion.correlation_time".into(), correlation_time)]
+            }
+            PlantEntry::Rate { motion: MotionEntry::IntegratedRandomWalk { density }, .. } => {
+                vec![("motion.density".into(), density)]
+            }
+            PlantEntry::Vertical { accelerometer, .. } => {
+                accelerometer.noise_parameters().map(|(path, m)| (format!("accelerometer.{path}"), m)).collect()
+            }
+            PlantEntry::Static | PlantEntry::Angle { .. } | PlantEntry::Custom(_) => Vec::new(),
+        };
+        plant.into_iter().chain(self.aids.iter_mut().flat_map(|aid| {
+            let name = &aid.name;
+            let drift = aid
+                .gauss_markov
+                .iter_mut()
+                .flat_map(|drift| [("std_dev", &mut drift.std_dev), ("correlation_time", &mut drift.correlation_time)]);
+            let drift = drift.map(|(key, m)| (format!("{name}.gauss_markov.{key}"), m));
+            std::iter::once((format!("{name}.std_dev"), &mut aid.std_dev)).chain(drift).collect::<Vec<_>>()
+        }))
+    }
+
     /// Reads a file that holds nothing but the section.
     pub fn from_json(text: &str, path: &str) -> Result<Design, ParamsError> {
         let value = place::parse(text).map_err(|e| ParamsError::Syntax {

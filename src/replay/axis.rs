@@ -7,6 +7,7 @@ use super::{LAGS, NIS_BINS, sensors};
 use crate::consistency::low_frequency::{LowFrequency, time_constants};
 use crate::consistency::whiteness::Autocorrelation;
 use crate::filter::AxisDesign;
+use crate::filter::innovations::nearest_turn;
 use crate::filter::kalman::{Kalman, Update};
 use crate::filter::smoother::History;
 use crate::model::LinearModel;
@@ -210,11 +211,7 @@ impl Channel {
 
     /// A measured angle, by whole turns nearest to what the filter expects.
     fn nearest(&self, z: f64, x: &DVector<f64>) -> f64 {
-        if !self.angle {
-            return z;
-        }
-        let turns = ((z - self.h.dot(x)) / std::f64::consts::TAU).round();
-        if turns == 0.0 { z } else { z - turns * std::f64::consts::TAU }
+        if self.angle { nearest_turn(z, self.h.dot(x)) } else { z }
     }
 
     fn skip(&mut self) {

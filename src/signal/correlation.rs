@@ -38,6 +38,33 @@ pub fn autocorrelation(x: &[f64], max_lag: usize) -> Vec<f64> {
     r
 }
 
+/// Lags 0 … `max_lag` of the sums Σ_k a_{k+h} b_k, without a mean taken off; 0 where nothing overlaps. `a` and `b` have the same length.
+pub fn lagged_products(a: &[f64], b: &[f64], max_lag: usize) -> Vec<f64> {
+    let lags = max_lag.min(a.len().saturating_sub(1));
+    let direct = |h: usize| a.get(h..).unwrap_or_default().iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let length = fast_length(a.len() + lags);
+    let mut planner = RealFftPlanner::<f64>::new();
+    let (forward, inverse) = (planner.plan_fft_forward(length), planner.plan_fft_inverse(length));
+    let transform = |x: &[f64]| {
+        let (mut time, mut frequency) = (forward.make_input_vec(), forward.make_output_vec());
+        time[..x.len()].copy_from_slice(x);
+        forward.process(&mut time, &mut frequency).ok().map(|()| frequency)
+    };
+    let by_fft = || {
+        let (mut product, other) = (transform(a)?, transform(b)?);
+        product.iter_mut().zip(&other).for_each(|(a, b)| *a *= b.conj());
+        let mut time = inverse.make_output_vec();
+        inverse.process(&mut product, &mut time).ok()?;
+        Some(time[..=lags].iter().map(|sum| sum / length as f64).collect::<Vec<f64>>())
+    };
+    let cheap = a.len() < 2 || direct_is_cheaper(a.len(), lags);
+    // the transforms only fail on buffers of a wrong length, which cannot be here
+    let fast = if cheap { None } else { by_fft() };
+    let mut sums = fast.unwrap_or_else(|| (0..=lags).map(direct).collect());
+    sums.resize(max_lag + 1, 0.0);
+    sums
+}
+
 /// The FFT costs about as much as this many lags done directly.
 fn direct_is_cheaper(n: usize, lags: usize) -> bool {
     let stages = (2 * n).ilog2() as usize;
@@ -110,6 +137,19 @@ mod tests {
             let lags = n - 1;
             for (a, b) in direct(&x, lags).iter().zip(by_fft(&x, lags)) {
                 assert!((a - b).abs() < 1e-13, "n = {n}: {a} and {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn products_at_lags_are_sums_of_products() {
+        for n in [1, 2, 100, 3000] {
+            let (a, b) = (series(n), series(n + 7)[7..].to_vec());
+            let lags = n / 2;
+            let found = lagged_products(&a, &b, lags + 1);
+            for (h, found) in found.iter().enumerate() {
+                let sum: f64 = (h..n).map(|k| a[k] * b[k - h]).sum();
+                assert!((found - sum).abs() < 1e-10, "n = {n}, lag {h}: {found} and {sum}");
             }
         }
     }

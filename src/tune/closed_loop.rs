@@ -25,7 +25,7 @@ pub struct Share {
 }
 
 /// The states that stay uncertain: those of driven processes. The others are learnt for good. None if `row` sees none of them.
-fn driven(model: &LinearModel, row: &DMatrix<f64>) -> Vec<usize> {
+pub(super) fn driven(model: &LinearModel, row: &DMatrix<f64>) -> Vec<usize> {
     let undriven = undriven_states(model);
     let driven: Vec<usize> = (0..model.states.len()).filter(|i| !undriven.contains(i)).collect();
     if driven.iter().any(|&i| row[(0, i)] != 0.0) { driven } else { Vec::new() }
@@ -154,9 +154,9 @@ fn white_name(model: &LinearModel, measurement: usize) -> String {
     format!("{}.white", model.measurements[measurement].name)
 }
 
-/// The states `kept` alone, settled, before the measurements of a sample at which all are taken.
-fn settled(model: &LinearModel, kept: &[usize]) -> Result<LinearModel, LinalgError> {
-    let mut alone = LinearModel {
+/// The states `kept` alone.
+pub(super) fn alone(model: &LinearModel, kept: &[usize]) -> LinearModel {
+    LinearModel {
         states: kept.iter().map(|&i| model.states[i].clone()).collect(),
         outputs: Vec::new(),
         f: part(&model.f, kept, kept),
@@ -166,7 +166,12 @@ fn settled(model: &LinearModel, kept: &[usize]) -> Result<LinearModel, LinalgErr
         x0: model.x0.select_rows(kept),
         p0: part(&model.p0, kept, kept),
         ..model.clone()
-    };
+    }
+}
+
+/// The states `kept` alone, settled, before the measurements of a sample at which all are taken.
+pub(super) fn settled(model: &LinearModel, kept: &[usize]) -> Result<LinearModel, LinalgError> {
+    let mut alone = alone(model, kept);
     let steady = steady_state(&alone).map_err(|error| match error {
         SteadyStateError::Linalg(source) | SteadyStateError::Riccati { source, .. } => source,
         _ => LinalgError::Singular,

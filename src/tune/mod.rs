@@ -3,10 +3,12 @@
 //! `sensor` turns the parameters of an axis into a linear model (merging what no filter can tell apart), `plant` joins it with the
 //! documented plant and its aids, `prediction` propagates its
 //! covariance over any time, `closed_loop` splits the final variance into its causes and finds the bandwidth,
-//! `under_truth` says what the design does when the sensor is another.
+//! `objective` chooses the physical `parameters`, `under_truth` says what the design does when the sensor is another.
 
 mod closed_loop;
 mod flicker;
+pub mod objective;
+mod parameters;
 mod plant;
 mod prediction;
 mod sensor;
@@ -136,7 +138,8 @@ pub fn tune(params: &Params, options: &TuneOptions) -> Result<Tuned, TuneError> 
         axes,
         tuning: json!({
             "method": "exact discretisation of the documented noise terms; nothing is fitted",
-            "objective": "least mean square error of every state",
+            "objective": "nominal",
+            "criterion": "least mean square error of every state",
             "axes": decisions,
         }),
     };

@@ -16,7 +16,8 @@ pub(super) struct PlantFlags {
     /// What the sensor is part of: static, angle, rate, vertical, or a design FILE.json [default: the design of PARAMS, else static]
     #[arg(long, value_name = "PLANT")]
     pub(super) plant: Option<String>,
-    /// A measurement of the plant: "[NAME:] SIGMA [@ RATE] [, SIGMA over TIME]", for example "heading: 2 deg @ 1 Hz, 1 deg over 60 s"
+    /// A measurement of the plant: "[NAME:] SIGMA [@ RATE] [, SIGMA over TIME]", for example "heading: 2 deg @ 1 Hz, 1 deg over 60 s"; or
+    /// its column in the logs, as in replay: heading=yaw:deg
     #[arg(long, value_name = "AID")]
     pub(super) aid: Vec<String>,
     /// Plant rate: "SIGMA over TIME" for a Gauss-Markov rate, or the density of an integrated random walk, such as "5 deg/s^2/sqrt(s)"
@@ -28,18 +29,24 @@ pub(super) struct PlantFlags {
 }
 
 impl PlantFlags {
+    /// The aids that are columns of logs: NAME=COLUMN.
+    pub(super) fn columns(&self) -> Vec<String> {
+        self.aid.iter().filter(|text| text.contains('=')).cloned().collect()
+    }
+
     /// `None`: no flag was given, the parameters decide.
     pub(super) fn design(&self, params: &Params) -> anyhow::Result<Option<Design>> {
-        let nothing = self.plant.is_none() && self.aid.is_empty() && self.motion.is_none();
+        let aids: Vec<&String> = self.aid.iter().filter(|text| !text.contains('=')).collect();
+        let nothing = self.plant.is_none() && aids.is_empty() && self.motion.is_none();
         if nothing && self.accelerometer.is_none() {
             return Ok(None);
         }
         let mut design = self.chosen(params.design.clone().unwrap_or_default())?;
         self.set_plant(&mut design.plant)?;
-        if !self.aid.is_empty() {
+        if !aids.is_empty() {
             design.aids.clear();
         }
-        for text in &self.aid {
+        for text in aids {
             let aid = aid(text, &design).with_context(|| format!("--aid \"{text}\""))?;
             if design.aids.iter().any(|earlier| earlier.name == aid.name) {
                 bail!("--aid \"{text}\": '{}' is the name of an earlier aid too; write \"NAME: …\"", aid.name);

@@ -17,7 +17,7 @@ pub(super) fn sheet(view: &View<'_>) -> String {
 }
 
 /// The report page.
-pub(super) fn page(view: &View<'_>, replay: Option<&ReplayResult>) -> Page {
+pub(super) fn page(view: &View<'_>, replays: &[ReplayResult]) -> Page {
     let (params, outcome) = (view.params, view.verification);
     let mut provenance = vec![
         ("parameters".to_string(), view.name.to_string()),
@@ -61,7 +61,7 @@ pub(super) fn page(view: &View<'_>, replay: Option<&ReplayResult>) -> Page {
                 tests.collect(),
             ),
     );
-    if let Some(result) = replay {
+    for result in replays {
         sections.push(Section::new("Replay of a log").paragraph(text::replay(result).trim().to_string()));
     }
     Page {

@@ -1,0 +1,101 @@
+//! `tune --compare`: designs ranked on logs.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+
+use super::logs::{Opened, Reading};
+use crate::cli::Status;
+use crate::cli::output::{digits, print_json, print_text, table};
+use crate::compare::designs::{Contest, RankError, Ranking};
+use crate::filter::FilterDesign;
+use crate::input::InputError;
+use crate::params::{Params, place};
+use crate::tune::{TuneOptions, tune};
+use crate::units::Unit;
+
+pub(super) fn run(
+    files: &[PathBuf],
+    held_out: f64,
+    json: bool,
+    options: &TuneOptions,
+    reading: &Reading<'_>,
+) -> anyhow::Result<Status> {
+    if !(held_out > 0.0 && held_out <= 0.9) {
+        bail!("--held-out is {held_out}; expected a share of the log above 0 and up to 0.9");
+    }
+    let (designs, logs): (Vec<&PathBuf>, Vec<&PathBuf>) =
+        files.iter().partition(|path| path.extension().is_some_and(|e| e == "json"));
+    if designs.is_empty() || logs.is_empty() {
+        bail!(
+            "--compare: found {} designs (.json) and {} logs; expected designs and then at least one log",
+            designs.len(),
+            logs.len()
+        );
+    }
+    let designs = designs.iter().map(|path| design(path, options)).collect::<anyhow::Result<Vec<_>>>()?;
+    let Some((_, first)) = designs.first().cloned() else { bail!("--compare: no design") };
+    let mut contest = Contest::new(designs, held_out)?;
+    for path in logs {
+        let Opened { name, mut reader, shape } = reading.open(path, &first)?;
+        let rows = reader.check().samples;
+        contest
+            .log(&name, &shape, rows, |block| reader.next_block(block).map_err(Failed::Input))
+            .with_context(|| name.clone())?;
+    }
+    let ranking = contest.conclude();
+    if json {
+        print_json(&ranking)?;
+    } else {
+        print_text(&text(&ranking, &first))?;
+    }
+    Ok(Status::Done)
+}
+
+#[derive(Debug, thiserror::Error)]
+enum Failed {
+    #[error(transparent)]
+    Input(InputError),
+    #[error(transparent)]
+    Rank(#[from] RankError),
+}
+
+/// filter.json, or the nominal design of params.json.
+fn design(path: &Path, options: &TuneOptions) -> anyhow::Result<(String, FilterDesign)> {
+    let name = path.display().to_string();
+    let text = std::fs::read_to_string(path).with_context(|| format!("{name}: cannot read"))?;
+    let format = place::parse(&text).ok().and_then(|value| value.get("format")?.as_str().map(str::to_string));
+    if format.is_some_and(|format| format.starts_with("kfdesign-params/")) {
+        let params = Params::from_json(&text, &name)?;
+        let tuned = tune(&params, options).with_context(|| name.clone())?;
+        return Ok((name, tuned.design));
+    }
+    let design = FilterDesign::from_json(&text, &name)?;
+    Ok((name, design))
+}
+
+fn text(ranking: &Ranking, design: &FilterDesign) -> String {
+    let unit = design.axes.first().map(|axis| axis.noise.display_unit(design.quantity)).unwrap_or_else(Unit::one);
+    let rows = ranking.designs.iter().enumerate().map(|(i, d)| {
+        let verdicts: Vec<&str> = d.verdicts.iter().map(|verdict| verdict.word()).collect();
+        let sigmas: Vec<String> = d.steady.iter().map(|axis| digits(unit.from_si(axis.sigma))).collect();
+        let behind = if i == 0 { "-".into() } else { format!("{:.2} ± {:.2}", d.behind, d.behind_std_dev) };
+        vec![
+            d.design.clone(),
+            d.objective.clone().unwrap_or_else(|| "-".into()),
+            format!("{:.2}", d.held_out_log_likelihood),
+            behind,
+            verdicts.join(", "),
+            sigmas.join(", "),
+        ]
+    });
+    let sigma = format!("steady sigma ({unit})");
+    let header = ["design", "objective", "held-out ln L", "behind", "verdict", &sigma];
+    format!(
+        "Designs by the likelihood of the last {:.1} % of {}\n{}\n{}\n",
+        100.0 * ranking.held_out,
+        ranking.logs.join(", "),
+        table(&header, &rows.collect::<Vec<_>>()),
+        ranking.meaning
+    )
+}

@@ -1,0 +1,84 @@
+//! Logs for `tune`: read into memory for the objectives, replayed, or for a ranking.
+
+use std::path::Path;
+
+use anyhow::Context;
+
+use crate::cli::aid_columns::aid_columns;
+use crate::cli::log_flags::{LogFlags, print_check};
+use crate::cli::output::progress;
+use crate::filter::{FilterDesign, SensorLog};
+use crate::input::{Block, LogOptions, LogReader};
+use crate::replay::axes::assign;
+use crate::replay::{LogShape, Options, ReplayResult, Replayer};
+use crate::tune::objective::Log;
+
+/// How logs are read: the flags, and the columns of the aids.
+pub(super) struct Reading<'a> {
+    pub(super) flags: &'a LogFlags,
+    pub(super) aids: &'a [String],
+}
+
+/// A log opened for a design.
+pub(super) struct Opened {
+    pub(super) name: String,
+    pub(super) reader: LogReader,
+    pub(super) shape: LogShape,
+}
+
+impl Reading<'_> {
+    pub(super) fn open(&self, path: &Path, design: &FilterDesign) -> anyhow::Result<Opened> {
+        let name = path.display().to_string();
+        let extra = aid_columns(self.aids, design)?;
+        let aids = extra.len();
+        let reader = LogReader::open(path, &LogOptions { extra, ..self.flags.options()? })?;
+        let mut check = reader.check().clone();
+        // a plant's log is one that moves
+        check.findings.retain(|finding| design.plant == "static" || finding.kind != "motion");
+        print_check(&name, &check);
+        let shape = LogShape {
+            axes: reader.axes().iter().map(|a| a.name.clone()).collect(),
+            quantity: reader.quantity(),
+            sample_rate_hz: check.sample_rate_hz,
+            aids,
+        };
+        Ok(Opened { name, reader, shape })
+    }
+
+    /// The whole log, its axes in the order of the design's, and its SHA-256.
+    pub(super) fn read(&self, path: &Path, design: &FilterDesign) -> anyhow::Result<(Log, String)> {
+        let Opened { name, mut reader, shape } = self.open(path, design)?;
+        let assigned = assign(design, &shape).with_context(|| name.clone())?;
+        let mut axes = vec![SensorLog::default(); design.axes.len()];
+        let mut block = Block::default();
+        while reader.next_block(&mut block)? {
+            let mut extra = block.extra.iter();
+            for ((log, axis), &column) in axes.iter_mut().zip(&design.axes).zip(&assigned) {
+                log.sensor.extend_from_slice(&block.values[column]);
+                log.missing.extend_from_slice(&block.missing);
+                let aids = axis.model.measurements.len() - usize::from(axis.model.inputs.is_empty());
+                log.aids.resize_with(aids, Vec::new);
+                log.aids.iter_mut().zip(&mut extra).for_each(|(aid, values)| aid.extend_from_slice(values));
+            }
+        }
+        let sha256 = reader.sha256().to_string();
+        Ok((Log { name, axes }, sha256))
+    }
+
+    /// The log through the design; only the verdict is wanted.
+    pub(super) fn replay(&self, path: &Path, design: &FilterDesign) -> anyhow::Result<ReplayResult> {
+        let Opened { name, mut reader, shape } = self.open(path, design)?;
+        let mut replayer = Replayer::new(design, &shape, Options::default()).with_context(|| name.clone())?;
+        let mut block = Block::default();
+        let bar = progress(reader.check().samples, "replay");
+        while reader.next_block(&mut block)? {
+            replayer.push(&block, None);
+            bar.inc(block.time_s.len() as u64);
+        }
+        bar.finish_and_clear();
+        let mut result = replayer.finish();
+        result.log = Some(name);
+        result.log_sha256 = Some(reader.sha256().to_string());
+        Ok(result)
+    }
+}

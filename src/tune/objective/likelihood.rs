@@ -1,0 +1,292 @@
+//! Physical parameters refined on logs: the maximum of innovation likelihood times prior.
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
+use slsqp::{Func, StopTols, minimize};
+
+use super::{Found, Log, ObjectiveError, Problem};
+use crate::filter::innovations::log_likelihood;
+use crate::model::LinearModel;
+use crate::tune::parameters::Group;
+use crate::units::digits;
+
+/// A correlation time of which nothing else is known needs so many of its lengths.
+const LENGTHS_TO_TELL: f64 = 3.0;
+/// Fewest samples of a log.
+const FEWEST_SAMPLES: usize = 100;
+/// A parameter is searched within this of its start, as a logarithm: a factor of a thousand.
+const REACH: f64 = 6.907_755_278_982_137;
+/// Step of numerical derivatives in standard deviations of what the logs say.
+const STEP: f64 = 0.02;
+/// Restarts at most; the search ends when one gains less in ln L.
+const RESTARTS: usize = 8;
+const ENOUGH: f64 = 1e-7;
+/// Bounds of the standard deviations by which logarithms are scaled.
+const SCALES: (f64, f64) = (1e-6, 1.0);
+
+/// What the logs said of the parameters of one axis.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct LikelihoodAxis {
+    /// Several where they share parameters of an aid.
+    pub axis: String,
+    /// Whether the identified intervals counted.
+    pub priors: bool,
+    pub logs: Vec<LikelihoodLog>,
+    /// ln L of what was fitted, as identified and at the maximum.
+    pub fitted_before: f64,
+    pub fitted: f64,
+    /// ln of the prior, less its largest value, at the maximum.
+    pub prior: f64,
+    /// Gain in ln L of what was held out, over all logs; absent when nothing was.
+    pub held_out_gain: Option<f64>,
+    /// Parameters at an end of the search, where the logs say nothing more than a limit.
+    pub at_limit: Vec<String>,
+}
+
+/// One log, SI.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct LikelihoodLog {
+    pub log: String,
+    /// Rows to which parameters were fitted, and rows after them that were held out.
+    pub fitted_rows: usize,
+    pub held_out_rows: usize,
+    /// ln L of the held-out rows given those before, as identified and at the maximum.
+    pub held_out_before: f64,
+    pub held_out: f64,
+}
+
+/// The search of one group.
+struct Search<'a> {
+    problem: &'a Problem<'a>,
+    group: &'a Group,
+    /// √P0 of the bias is no matter of the noise here, even where it was guessed from it: variances of constants, by axis.
+    constants: Vec<Vec<(usize, f64)>>,
+}
+
+pub(super) fn choose(
+    problem: &Problem<'_>,
+    group: &Group,
+    told: &mut Vec<LikelihoodAxis>,
+) -> Result<Found, ObjectiveError> {
+    let request = problem.request;
+    if request.logs.is_empty() {
+        return Err(ObjectiveError::NoLog { objective: request.objective.name() });
+    }
+    if !(0.0..=0.9).contains(&request.held_out) {
+        return Err(ObjectiveError::HeldOut { found: request.held_out });
+    }
+    refuse_short(problem, group)?;
+    let nominal = problem.models(group, &vec![0.0; group.free.len()])?;
+    let constant = |model: &LinearModel| -> Vec<(usize, f64)> {
+        let holds = |i: &usize| model.f[(*i, *i)] == 1.0;
+        (0..model.states.len()).filter(holds).map(|i| (i, model.p0[(i, i)])).collect()
+    };
+    let search = Search { problem, group, constants: nominal.iter().map(constant).collect() };
+    let (shifts, std_devs) = search.run()?;
+    let none = vec![0.0; shifts.len()];
+    let logs = request.logs.iter().map(|log| search.held_out(log, &none, &shifts)).collect::<Result<Vec<_>, _>>()?;
+    let names: Vec<String> = group.axes.iter().map(|&axis| problem.axis_name(axis)).collect();
+    let at_limit = |k: &usize| shifts[*k].abs() >= REACH * (1.0 - 1e-6);
+    told.push(LikelihoodAxis {
+        axis: names.join(", "),
+        priors: request.priors,
+        fitted_before: search.of_logs(&none)?,
+        fitted: search.of_logs(&shifts)?,
+        prior: search.of_priors(&shifts),
+        held_out_gain: (request.held_out > 0.0)
+            .then(|| logs.iter().map(|log| log.held_out - log.held_out_before).sum()),
+        at_limit: (0..shifts.len()).filter(at_limit).map(|k| problem.space.name(group.free[k])).collect(),
+        logs,
+    });
+    Ok(Found { shifts, std_devs })
+}
+
+/// A log says little of a correlation time that it does not hold some times over, unless there is a prior.
+fn refuse_short(problem: &Problem<'_>, group: &Group) -> Result<(), ObjectiveError> {
+    for log in problem.request.logs {
+        let wrong = |message: String| ObjectiveError::Log { log: log.name.clone(), message };
+        let rows = log.axes.iter().map(|axis| axis.len()).min().unwrap_or(0);
+        let fitted = fitted_rows(problem, log);
+        if fitted < FEWEST_SAMPLES {
+            return Err(wrong(format!(
+                "{rows} samples are too few; expected at least {FEWEST_SAMPLES} that are not held out"
+            )));
+        }
+        let span = fitted as f64 * problem.dt();
+        for &i in &group.free {
+            let parameter = &problem.space.parameters[i];
+            let known = problem.request.priors && parameter.prior().is_some();
+            let time = parameter.value.si();
+            if parameter.path.ends_with("correlation_time") && !known && span < LENGTHS_TO_TELL * time {
+                let name = problem.space.name(i);
+                return Err(wrong(format!(
+                    "{} s to be fitted to are too short for {name} of {} s, of which no interval is known; give a log that holds it {} times \
+                     over, or hold it (--hold {name})",
+                    digits(span),
+                    digits(time),
+                    digits(LENGTHS_TO_TELL)
+                )));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn fitted_rows(problem: &Problem<'_>, log: &Log) -> usize {
+    let rows = log.axes.first().map_or(0, |axis| axis.len());
+    (rows as f64 * (1.0 - problem.request.held_out)).round() as usize
+}
+
+impl Search<'_> {
+    /// The models at these shifts, with the P0 of constants that they had.
+    fn models(&self, shifts: &[f64]) -> Result<Vec<LinearModel>, ObjectiveError> {
+        let mut models = self.problem.models(self.group, shifts)?;
+        for (model, constants) in models.iter_mut().zip(&self.constants) {
+            for &(i, variance) in constants.iter().filter(|(i, _)| *i < model.states.len()) {
+                model.p0[(i, i)] = variance;
+            }
+        }
+        Ok(models)
+    }
+
+    /// ln L of the first part of every log.
+    fn of_logs(&self, shifts: &[f64]) -> Result<f64, ObjectiveError> {
+        let models = self.models(shifts)?;
+        let of = |log: &Log| -> f64 {
+            let rows = fitted_rows(self.problem, log);
+            let axes = self.group.axes.iter().zip(&models);
+            axes.map(|(&axis, model)| log_likelihood(model, &log.axes[axis], rows)).sum()
+        };
+        Ok(self.problem.request.logs.iter().map(of).sum())
+    }
+
+    fn of_priors(&self, shifts: &[f64]) -> f64 {
+        let of = |(&i, shift): (&usize, &f64)| {
+            let parameter = &self.problem.space.parameters[i];
+            let prior = parameter.prior().filter(|_| self.problem.request.priors);
+            prior.map_or(0.0, |prior| -0.5 * ((parameter.log() + shift - prior.mean) / prior.std_dev).powi(2))
+        };
+        self.group.free.iter().zip(shifts).map(of).sum()
+    }
+
+    /// ln(L · prior), hugely negative where there is no such model.
+    fn value(&self, shifts: &[f64]) -> f64 {
+        let value = self.of_logs(shifts).map_or(f64::NAN, |value| value + self.of_priors(shifts));
+        if value.is_finite() { value } else { -f64::MAX.sqrt() }
+    }
+
+    /// Shifts at the maximum, and standard deviations from the second differences there.
+    fn run(&self) -> Result<(Vec<f64>, Vec<Option<f64>>), ObjectiveError> {
+        let n = self.group.free.len();
+        let mut at = vec![0.0; n];
+        // a model that cannot be built says so
+        let mut best = self.of_logs(&at)? + self.of_priors(&at);
+        for _ in 0..RESTARTS {
+            let scale = self.scales(&at, best);
+            let place = |x: &[f64]| -> Vec<f64> { x.iter().zip(&scale).map(|(x, s)| x * s).collect() };
+            let f = |x: &[f64], slope: Option<&mut [f64]>, _: &mut ()| {
+                if let Some(slope) = slope {
+                    let side = |k: usize, step: f64| {
+                        let mut moved = x.to_vec();
+                        moved[k] += step;
+                        self.value(&place(&moved))
+                    };
+                    let slopes: Vec<f64> =
+                        (0..n).into_par_iter().map(|k| -(side(k, STEP) - side(k, -STEP)) / (2.0 * STEP)).collect();
+                    slope.copy_from_slice(&slopes);
+                }
+                -self.value(&place(x))
+            };
+            let start: Vec<f64> = at.iter().zip(&scale).map(|(v, s)| v / s).collect();
+            let bounds: Vec<(f64, f64)> = scale.iter().map(|s| (-REACH / s, REACH / s)).collect();
+            let none: [&dyn Func<()>; 0] = [];
+            let tolerances = StopTols { ftol_abs: 0.1 * ENOUGH, ..StopTols::default() };
+            let (x, value) = match minimize(f, &start, &bounds, &none, (), 100, Some(tolerances)) {
+                Ok((_, x, value)) | Err((_, x, value)) => (x, -value),
+            };
+            let gain = value - best;
+            if gain > 0.0 && x.iter().all(|v| v.is_finite()) {
+                (best, at) = (value, place(&x));
+            }
+            if gain < ENOUGH {
+                break;
+            }
+        }
+        let std_devs = self.std_devs(&at, best);
+        Ok((at, std_devs))
+    }
+
+    /// Standard deviation of each logarithm alone, from the curvature.
+    fn scales(&self, at: &[f64], value: f64) -> Vec<f64> {
+        let scale = |k: usize| {
+            let mut step = 1e-3;
+            for _ in 0..4 {
+                let side = |by: f64| {
+                    let mut moved = at.to_vec();
+                    moved[k] += by;
+                    self.value(&moved)
+                };
+                let curvature = (2.0 * value - side(step) - side(-step)) / (step * step);
+                let next = if curvature > 0.0 { curvature.sqrt().recip().clamp(SCALES.0, SCALES.1) } else { SCALES.1 };
+                if next / step > 0.2 && next / step < 5.0 {
+                    return next;
+                }
+                step = next;
+            }
+            step
+        };
+        (0..at.len()).into_par_iter().map(scale).collect()
+    }
+
+    /// Of the logarithms, from the inverse of the matrix of second differences; `None` where the maximum is flat.
+    fn std_devs(&self, at: &[f64], value: f64) -> Vec<Option<f64>> {
+        let n = at.len();
+        let step: Vec<f64> = self.scales(at, value).iter().map(|s| 0.5 * s).collect();
+        let moved = |shifts: [(usize, f64); 2]| {
+            let mut moved = at.to_vec();
+            shifts.iter().for_each(|(k, sign)| moved[*k] += sign * step[*k]);
+            self.value(&moved)
+        };
+        let pairs: Vec<(usize, usize)> = (0..n).flat_map(|i| (0..=i).map(move |k| (i, k))).collect();
+        let second = |&(i, k): &(usize, usize)| {
+            if i == k {
+                return 2.0 * value - moved([(i, 1.0), (i, 0.0)]) - moved([(i, -1.0), (i, 0.0)]);
+            }
+            let corner = |a: f64, b: f64| moved([(i, a), (k, b)]);
+            -0.25 * (corner(1.0, 1.0) - corner(1.0, -1.0) - corner(-1.0, 1.0) + corner(-1.0, -1.0))
+        };
+        let found: Vec<f64> = pairs.par_iter().map(second).collect();
+        let mut information = DMatrix::zeros(n, n);
+        for ((i, k), v) in pairs.into_iter().zip(found) {
+            (information[(i, k)], information[(k, i)]) = (v, v);
+        }
+        match nalgebra::Cholesky::new(information) {
+            Some(factor) => {
+                let covariance = factor.inverse();
+                (0..n).map(|k| Some(covariance[(k, k)].sqrt() * step[k])).collect()
+            }
+            None => vec![None; n],
+        }
+    }
+
+    fn held_out(&self, log: &Log, before: &[f64], after: &[f64]) -> Result<LikelihoodLog, ObjectiveError> {
+        let fitted = fitted_rows(self.problem, log);
+        let all = log.axes.first().map_or(0, |axis| axis.len());
+        let rest = |shifts: &[f64]| -> Result<f64, ObjectiveError> {
+            let of = |(&axis, model): (&usize, &LinearModel)| {
+                let log = &log.axes[axis];
+                log_likelihood(model, log, all) - log_likelihood(model, log, fitted)
+            };
+            Ok(self.group.axes.iter().zip(&self.models(shifts)?).map(of).sum())
+        };
+        Ok(LikelihoodLog {
+            log: log.name.clone(),
+            fitted_rows: fitted,
+            held_out_rows: all - fitted,
+            held_out_before: rest(before)?,
+            held_out: rest(after)?,
+        })
+    }
+}

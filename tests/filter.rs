@@ -4,6 +4,7 @@ mod document;
 mod kalman;
 mod likelihood;
 mod mismatch;
+mod single;
 mod smoother;
 mod square_root;
 mod steady_state;

@@ -1,10 +1,13 @@
 //! Plants joined with the errors of their sensors.
 
 mod flights;
+mod insight;
 mod matrices;
 mod property;
 mod refused;
 mod replay;
+mod robust;
+mod simulated;
 
 use kfdesign::params::Params;
 

@@ -305,7 +305,7 @@ fn draw(design: &FilterDesign, run: u64, samples: usize) -> Vec<f64> {
 fn verdicts_on_an_hour_of_the_reference_sensor() {
     let right = skydog(0.01, 1.0, 1.0, 1.0);
     let log = draw(&right, 1, 360_000);
-    let options = Options { alpha: 0.001, gate: None };
+    let options = Options { alpha: 0.001, ..Options::default() };
     let result = replay(&right, &log, options);
     assert_eq!(result.verdict, Verdict::Consistent, "{}", result.meaning);
     assert_eq!(result.axes[0].low_frequency.len(), 4, "blocks of 1/4, 1, 4 and 16 time constants");
@@ -333,7 +333,7 @@ fn verdicts_on_an_hour_of_the_reference_sensor() {
 #[test]
 fn right_designs_are_rarely_rejected() {
     let right = skydog(1.0, 1.0, 1.0, 1.0);
-    let options = Options { alpha: 0.05, gate: None };
+    let options = Options { alpha: 0.05, ..Options::default() };
     let mut counts = [0u32; 3];
     for run in 0..500 {
         let verdict = replay(&right, &draw(&right, 100 + run, 1500), options).verdict;
@@ -357,7 +357,8 @@ fn gaps_reject_no_right_design() {
     let rejected = |run: u64| {
         let mut z = draw(&right, 1000 + run, 3000);
         z.drain(1199..1299);
-        let mut replayer = Replayer::new(&right, &shape(&["x"], 10.0), Options { alpha: 0.05, gate: None }).unwrap();
+        let mut replayer =
+            Replayer::new(&right, &shape(&["x"], 10.0), Options { alpha: 0.05, ..Options::default() }).unwrap();
         replayer.push(&block(&z, &missing, 0.1, 0..2900), None);
         replayer.finish().verdict == Verdict::Inconsistent
     };
@@ -369,7 +370,7 @@ fn gaps_reject_no_right_design() {
 #[test]
 fn start_test_has_its_size() {
     let right = skydog(1.0, 1.0, 1.0, 1.0);
-    let options = Options { alpha: 0.05, gate: None };
+    let options = Options { alpha: 0.05, ..Options::default() };
     let (mut rejected, mut spread) = (0u32, 0.0);
     for run in 0..3000 {
         let result = replay(&right, &draw(&right, 10_000 + run, 60), options);
@@ -403,7 +404,7 @@ fn bias_outside_p0_is_named() {
 #[test]
 fn gated_statistics_have_truncated_moments() {
     let right = skydog(1.0, 1.0, 1.0, 1.0);
-    let options = Options { alpha: 0.01, gate: Some(2.0) };
+    let options = Options { alpha: 0.01, gate: Some(2.0), ..Options::default() };
     let (mut bad, mut nis, mut rejected) = (0, 0.0, 0);
     for run in 0..200 {
         let mut log = draw(&right, 20_000 + run, 1500);
@@ -503,7 +504,7 @@ fn wrong_logs_and_options_are_refused() {
     let force = LogShape { quantity: Quantity::SpecificForce, ..fits.clone() };
     assert!(refuse(&force, Options::default()).contains("the log is in m/s^2 but the filter is for rad/s"));
     for alpha in [0.0, 1.0, f64::NAN] {
-        assert!(refuse(&fits, Options { alpha, gate: None }).starts_with("alpha is"));
+        assert!(refuse(&fits, Options { alpha, ..Options::default() }).starts_with("alpha is"));
     }
     for gate in [0.5, -3.0, f64::NAN, f64::INFINITY] {
         assert!(refuse(&fits, Options { gate: Some(gate), ..Options::default() }).starts_with("gate is"));

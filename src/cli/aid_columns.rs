@@ -20,7 +20,7 @@ pub(super) fn aid_columns(flags: &[String], design: &FilterDesign) -> anyhow::Re
         if axes == 0 {
             let known: BTreeSet<&str> = needed.iter().map(|aid| aid.measurement.name.as_str()).collect();
             let known = if known.is_empty() { "none".into() } else { known.into_iter().collect::<Vec<_>>().join(", ") };
-            bail!("--aid {flag}: the filter has no measurement '{name}' beside the sensor; it has {known}");
+            bail!("--aid {flag}: the filter has no measurement or input '{name}' beside the sensor; it has {known}");
         }
         if given.iter().any(|(known, _)| *known == name) {
             bail!("--aid {flag}: '{name}' is given twice");
@@ -39,7 +39,7 @@ pub(super) fn aid_columns(flags: &[String], design: &FilterDesign) -> anyhow::Re
         let measurement = &aid.measurement;
         let Some(at) = given.iter().position(|(name, _)| *name == measurement.name) else {
             bail!(
-                "the filter measures {} beside the sensor; say which column that is, --aid {0}=COLUMN",
+                "the filter needs {} beside the sensor; say which column that is, --aid {0}=COLUMN",
                 measurement.name
             );
         };

@@ -15,7 +15,7 @@ use super::tests_table::{TESTS, caption, rows};
 use crate::consistency::Verdict;
 use crate::export::atomic::{AtomicFile, refuse_input_as_output};
 use crate::export::table::TableWriter;
-use crate::filter::FilterDesign;
+use crate::filter::{FilterDesign, Form};
 use crate::input::{Block, LogOptions, LogReader};
 use crate::replay::{AxisResult, Estimates, LogShape, Options, ReplayResult, Replayer};
 use crate::units::{Quantity, Unit};
@@ -46,6 +46,13 @@ pub struct Args {
     /// Reject samples whose innovation is further out than this many sigmas
     #[arg(long, value_name = "SIGMAS")]
     gate: Option<f64>,
+    /// Samples further out than this many sigmas count as outliers: they move the estimate as far as one at that distance would, and are
+    /// not judged (Masreliez and Martin 1977)
+    #[arg(long, value_name = "SIGMAS", conflicts_with_all = ["gate", "smooth"])]
+    robust: Option<f64>,
+    /// How the filter carries its covariance
+    #[arg(long, value_enum, default_value_t = FormFlag::Joseph, conflicts_with = "smooth")]
+    form: FormFlag,
     /// One HTML page with tables and figures
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
@@ -55,7 +62,7 @@ pub struct Args {
     /// One JSON document on stdout
     #[arg(long)]
     json: bool,
-    /// Column of an aid of the filter, one per axis: NAME=COLUMN[,COLUMN…], with the unit if the header does not say it: heading=yaw:deg.
+    /// Column of an aid of the filter (or of a known input of a custom plant), one per axis: NAME=COLUMN[,COLUMN…], with the unit if the header does not say it: heading=yaw:deg.
     /// A row without a number is one without that measurement
     #[arg(long, value_name = "NAME=COLUMN")]
     aid: Vec<String>,
@@ -63,8 +70,27 @@ pub struct Args {
     reading: LogFlags,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum FormFlag {
+    /// P ← (I − K h) P (I − K h)ᵀ + K r Kᵀ
+    Joseph,
+    /// A triangular factor of P: right where P in double precision is not
+    SquareRoot,
+    /// The gains of the steady state from the first sample on, no covariance; a constant bias stays at its x0
+    ConstantGain,
+}
+
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
-    let options = Options { alpha: args.alpha, gate: args.gate };
+    let options = Options {
+        alpha: args.alpha,
+        gate: args.robust.or(args.gate),
+        clip: args.robust.is_some(),
+        form: match args.form {
+            FormFlag::Joseph => Form::Joseph,
+            FormFlag::SquareRoot => Form::SquareRoot,
+            FormFlag::ConstantGain => Form::ConstantGain,
+        },
+    };
     options.check()?;
     let design = FilterDesign::read(&args.filter)?;
     for output in [&args.output, &args.report, &args.plot].into_iter().flatten() {

@@ -7,19 +7,21 @@ use serde::Serialize;
 
 use super::Status;
 use super::flags::with_unit;
-use super::output::{digits, print_json, print_text, progress, table};
+use super::output::{digits, print_json, print_text, progress, shown_unit, table};
+use super::tune::plant_flags::PlantFlags;
 use crate::export::atomic;
 use crate::export::table::TableWriter;
 use crate::input::{self, LogOptions};
 use crate::numerics::reduce::Moments;
-use crate::params::{AxisParams, Params, TermEntry};
-use crate::simulate::{AxisBlock, Scenario, Simulator, TrueRate};
+use crate::params::{AxisParams, Design, Params, PlantEntry, TermEntry};
+use crate::simulate::{AxisBlock, Flight, FlightBlock, Scenario, Simulator, TrueRate};
 use crate::units::{Dimension, Quantity, Unit};
 
 /// A sensor stream with truth columns from params.json
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: kfdesign simulate data/params.json -o log.npy --duration 2h --seed 1\n\
-    Columns: time (s); gyro_NAME or accel_NAME per axis; truth_NAME_rate, truth_NAME_bias (constant), truth_NAME_drift.")]
+    Columns: time (s); gyro_NAME or accel_NAME per axis; truth_NAME_rate, truth_NAME_bias (constant), truth_NAME_drift. With a plant: AID_NAME \
+    for every aid (empty where it measures nothing), accelerometer_NAME, truth_NAME_angle (or tilt).")]
 pub struct Args {
     /// params.json: the sensor
     params: PathBuf,
@@ -62,6 +64,8 @@ pub struct Args {
     /// One JSON document on stdout
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    plant: PlantFlags,
 }
 
 /// Rows handed to the writer at once.
@@ -108,11 +112,16 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         }
     };
     let mut simulator = Simulator::new(&params, &scenario)?;
+    let design = args.plant.design(&params)?.or_else(|| params.design.clone()).unwrap_or_default();
+    let mut flight = Flight::new(&design, params.axes.len(), &scenario)?;
     let names: Vec<String> = params.axes.iter().map(|axis| column_name(axis, params.quantity)).collect();
-    let mut writer = TableWriter::create(&args.output, &header(&params, &names, &unit, !args.no_truth))?;
-    let mut shape = Shape::new(&scenario, unit, args);
+    let mut header = header(&params, &names, &unit, !args.no_truth);
+    let plant = PlantColumns::new(&design, params.quantity, &unit);
+    header.extend(plant.header(&params, !args.no_truth));
+    let mut writer = TableWriter::create(&args.output, &header)?;
+    let mut shape = Shape::new(&scenario, unit, plant, args);
     let mut moments = vec![(Moments::default(), 0); params.axes.len()];
-    let mut blocks = Vec::new();
+    let (mut blocks, mut flown) = (Vec::new(), Vec::new());
     let bar = progress(scenario.samples, "simulating");
     loop {
         let n = simulator.next_block(BLOCK, &mut blocks);
@@ -123,7 +132,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
             block.measured.iter().for_each(|x| moments.add(*x));
             *saturated += count_saturated(block, &scenario);
         }
-        writer.write(&shape.columns(n, &blocks))?;
+        if let Some(flight) = &mut flight {
+            flight.next_block(&blocks, &mut flown);
+        }
+        writer.write(&shape.columns(n, &blocks, &flown))?;
         bar.inc(n as u64);
     }
     bar.finish_and_clear();
@@ -304,9 +316,55 @@ fn header(params: &Params, names: &[String], unit: &Unit, truth: bool) -> Vec<St
     header
 }
 
+/// The columns of the plant: names and units.
+struct PlantColumns {
+    /// Name of the state; `None` for a sensor at rest.
+    state: Option<&'static str>,
+    /// Of the state and of what aids it: scale and text.
+    unit: (f64, String),
+    accelerometer: bool,
+    aids: Vec<String>,
+}
+
+impl PlantColumns {
+    fn new(design: &Design, quantity: Quantity, unit: &Unit) -> PlantColumns {
+        let (state, si) = match design.plant {
+            PlantEntry::Angle { .. } => (Some("angle"), "rad"),
+            PlantEntry::Vertical { .. } => (Some("tilt"), "rad"),
+            // its state is the true rate, which has a column
+            PlantEntry::Rate { .. } => (Some("rate"), quantity.si_unit()),
+            PlantEntry::Static | PlantEntry::Custom(_) => (None, quantity.si_unit()),
+        };
+        PlantColumns {
+            state,
+            unit: shown_unit(si, quantity, unit),
+            accelerometer: matches!(design.plant, PlantEntry::Vertical { .. }),
+            aids: design.aids.iter().map(|aid| aid.name.clone()).collect(),
+        }
+    }
+
+    fn shows_state(&self, truth: bool) -> bool {
+        truth && self.state.is_some_and(|name| name != "rate")
+    }
+
+    fn header(&self, params: &Params, truth: bool) -> Vec<String> {
+        let Some(state) = self.state else { return Vec::new() };
+        let unit = &self.unit.1;
+        let of_axis = |axis: &AxisParams| {
+            let name = &axis.name;
+            let accelerometer = self.accelerometer.then(|| format!("accelerometer_{name} (m/s^2)"));
+            let aids = self.aids.iter().map(move |aid| format!("{aid}_{name} ({unit})"));
+            let truth = self.shows_state(truth).then(|| format!("truth_{name}_{state} ({unit})"));
+            accelerometer.into_iter().chain(aids).chain(truth).collect::<Vec<_>>()
+        };
+        params.axes.iter().flat_map(of_axis).collect()
+    }
+}
+
 /// Blocks in SI to the columns of the file.
 struct Shape {
     unit: Unit,
+    plant: PlantColumns,
     rate_hz: f64,
     truth: bool,
     /// 10^decimals.
@@ -316,9 +374,10 @@ struct Shape {
 }
 
 impl Shape {
-    fn new(scenario: &Scenario, unit: Unit, args: &Args) -> Self {
+    fn new(scenario: &Scenario, unit: Unit, plant: PlantColumns, args: &Args) -> Self {
         Shape {
             unit,
+            plant,
             rate_hz: scenario.rate_hz,
             truth: !args.no_truth,
             rounding: args.decimals.map(|n| 10f64.powi(i32::from(n))),
@@ -327,15 +386,19 @@ impl Shape {
         }
     }
 
-    fn columns(&mut self, n: usize, blocks: &[AxisBlock]) -> Vec<&[f64]> {
-        let count = 1 + blocks.len() * if self.truth { 4 } else { 1 };
+    fn columns(&mut self, n: usize, blocks: &[AxisBlock], flown: &[FlightBlock]) -> Vec<&[f64]> {
+        let plant = &self.plant;
+        let states = plant.shows_state(self.truth);
+        let of_plant = usize::from(plant.accelerometer) + plant.aids.len() + usize::from(states);
+        let count = 1 + blocks.len() * if self.truth { 4 } else { 1 } + flown.len() * of_plant;
         self.buffers.resize_with(count, Vec::new);
         let (unit, rounding) = (&self.unit, self.rounding);
-        let show = |si: f64| match rounding {
+        let round = |value: f64| match rounding {
             // adding zero makes -0 a plain 0
-            Some(scale) => (unit.from_si(si) * scale).round() / scale + 0.0,
-            None => unit.from_si(si),
+            Some(scale) => (value * scale).round() / scale + 0.0,
+            None => value,
         };
+        let show = |si: f64| round(unit.from_si(si));
         let mut buffers = self.buffers.iter_mut();
         let mut put = |values: &mut dyn Iterator<Item = f64>| {
             if let Some(buffer) = buffers.next() {
@@ -351,6 +414,15 @@ impl Shape {
             put(&mut block.true_rate.iter().map(|x| show(*x)));
             put(&mut std::iter::repeat_n(show(block.bias), n));
             put(&mut block.drift.iter().map(|x| show(*x)));
+        }
+        for block in flown {
+            if let Some(values) = &block.accelerometer {
+                put(&mut values.iter().map(|x| round(*x)));
+            }
+            let states = states.then_some(&block.state);
+            for values in block.aids.iter().chain(states) {
+                put(&mut values.iter().map(|x| round(x / plant.unit.0)));
+            }
         }
         self.next += n as u64;
         self.buffers.iter().map(Vec::as_slice).collect()

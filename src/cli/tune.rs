@@ -1,9 +1,10 @@
 //! `kfdesign tune`.
 
 mod compare;
+mod insight;
 mod logs;
 mod objective;
-mod plant_flags;
+pub(super) mod plant_flags;
 mod sight;
 mod text;
 mod truth;
@@ -26,7 +27,7 @@ use crate::montecarlo::{Outcome, Plan, verify};
 use crate::params::Params;
 use crate::replay::ReplayResult;
 use crate::tune::objective::{Objective, Record, Request, tune_by};
-use crate::tune::{AxisReport, TuneOptions, Tuned, UnderTruth, tune, under_truth};
+use crate::tune::{AxisReport, Insight, TuneOptions, Tuned, UnderTruth, insight, tune, under_truth};
 
 /// The augmented Kalman filter from params.json
 ///
@@ -53,6 +54,9 @@ pub struct Args {
     /// Seed of the Monte Carlo
     #[arg(long, default_value_t = 1, value_name = "N")]
     seed: u64,
+    /// Also say when each state is known, what better parts would buy, and what wrong parameters would cost
+    #[arg(long)]
+    insight: bool,
     /// Also replay these logs through the design; the objectives likelihood and als choose the parameters on them
     #[arg(long, num_args = 1.., value_name = "LOG")]
     log: Vec<PathBuf>,
@@ -82,6 +86,8 @@ struct Printed<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     under_truth: Option<&'a [UnderTruth]>,
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    insight: &'a [Insight],
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
     replay: &'a [ReplayResult],
 }
 
@@ -106,6 +112,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let (mut tuned, record) = chosen(args, &params, &options, &reading).with_context(|| name.clone())?;
     let truth = args.truth.as_deref().map(|path| Truth::read(path, &tuned, &options)).transpose()?;
     let plan = Plan { runs: args.runs, seed: args.seed, ..Plan::quick(params.sample_rate_hz) };
+    let insights = if args.insight { insight(&tuned, &options)? } else { Vec::new() };
     let bar = progress(plan.runs * tuned.design.axes.len() as u64, "verify");
     let verification = verify(&tuned.design, &plan, &|runs| bar.inc(runs))?;
     bar.finish_and_clear();
@@ -122,8 +129,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         atomic::write(output, tuned.design.to_json().as_bytes())?;
     }
     let replays = args.log.iter().map(|log| reading.replay(log, &tuned.design)).collect::<anyhow::Result<Vec<_>>>()?;
-    let view =
-        text::View { name: &name, params: &params, tuned: &tuned, verification: &verification, truth: truth.as_ref() };
+    let view = text::View {
+        name: &name,
+        params: &params,
+        tuned: &tuned,
+        verification: &verification,
+        truth: truth.as_ref(),
+        insights: &insights,
+    };
     if let Some(path) = &args.plot {
         atomic::write(path, sight::sheet(&view).as_bytes())?;
     }
@@ -139,6 +152,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
             reports: &tuned.reports,
             verification: &verification,
             under_truth: truth.as_ref().map(|t| t.axes.as_slice()),
+            insight: &insights,
             replay: &replays,
         })?;
     } else {

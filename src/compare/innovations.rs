@@ -40,7 +40,8 @@ pub(super) fn innovations(
     let params = Params { quantity, sample_rate_hz: rate_hz, axes: vec![axis], design: None, source: None };
     let design = tune(&params, &TuneOptions::default()).map_err(|e| e.to_string())?.design;
     let shape = LogShape { axes: vec![name], quantity, sample_rate_hz: rate_hz, aids: 0 };
-    let mut replayer = Replayer::new(&design, &shape, Options { alpha, gate: None }).map_err(|e| e.to_string())?;
+    let mut replayer =
+        Replayer::new(&design, &shape, Options { alpha, ..Options::default() }).map_err(|e| e.to_string())?;
     for (number, part) in rate.chunks(BLOCK).enumerate() {
         let time = |k: usize| (number * BLOCK + k) as f64 / rate_hz;
         let block = Block {

@@ -164,6 +164,17 @@ impl Kalman {
     }
 }
 
+impl Kalman {
+    /// x ← x + K ν with the gain of measurement `index`, P as it is: what is left of a measurement too far out to be believed whole.
+    /// Source: Masreliez and Martin 1977, section IV, with Huber's clipped score.
+    pub fn nudge(&mut self, index: usize, innovation: f64) {
+        let h = self.h_columns.column(index);
+        let direction = &self.p * h;
+        let variance = h.dot(&direction) + self.r[index];
+        self.x.axpy(innovation / variance, &direction, 1.0);
+    }
+}
+
 /// A scalar measurement z = h x + v, v ~ N(0, r).
 struct Measurement<'a> {
     h: &'a [f64],

@@ -15,8 +15,10 @@ macro_rules! for_size {
     };
 }
 
+pub mod constant_gain;
 pub mod cycle;
 pub mod document;
+pub mod form;
 pub mod gains;
 pub mod innovations;
 pub mod judge;
@@ -25,13 +27,16 @@ pub mod likelihood;
 pub mod mismatch;
 mod reading;
 pub(crate) mod rows;
+pub mod single;
 pub mod smoother;
 pub mod square_root;
 pub mod steady_state;
 mod transition;
 
+pub use constant_gain::ConstantGain;
 pub use cycle::Cycle;
 pub use document::{AxisDesign, FilterDesign, FilterError};
+pub use form::{Form, Running};
 pub use gains::GainSequence;
 pub use innovations::SensorLog;
 pub use judge::Judge;

@@ -254,7 +254,16 @@ pub(super) fn model_of(
     axis: &crate::params::AxisParams,
     design: &FilterDesign,
 ) -> Result<LinearModel, MonteCarloError> {
-    let options = TuneOptions { design: design.design.clone(), ..TuneOptions::default() };
+    model_in(axis, design.design.clone(), design)
+}
+
+/// The model of parameters at the rate of a filter in another plant.
+pub(super) fn model_in(
+    axis: &crate::params::AxisParams,
+    plant: Option<crate::params::Design>,
+    design: &FilterDesign,
+) -> Result<LinearModel, MonteCarloError> {
+    let options = TuneOptions { design: plant, ..TuneOptions::default() };
     sensor_model(axis, design.quantity, 1.0 / design.sample_rate_hz, &options)
         .map_err(|source| MonteCarloError::Parameters { source })
 }

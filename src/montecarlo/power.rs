@@ -12,7 +12,7 @@ use serde::Serialize;
 use super::MonteCarloError;
 use super::calibration::{Caught, caught_of_experiments};
 use super::conclusion::test_name;
-use super::course::{AxisCourse, model_of};
+use super::course::{AxisCourse, model_in, model_of};
 use super::engine::Course;
 use super::experiment::Experiment;
 use super::gate::{AxisGate, Gate, Kind, Raw};
@@ -34,6 +34,8 @@ const ACCURACY: f64 = 5e-3;
 pub enum Mistuning {
     /// A coefficient of the noise terms by its path: `gauss_markov.std_dev`. Sizes are factors: filter over truth.
     Noise(String),
+    /// The same of the plant or an aid: `heading.std_dev`.
+    Plant(String),
     /// √P0 of this state. Sizes are factors.
     P0(usize),
     /// x0 of this state. Sizes are in sigmas of its P0.
@@ -102,6 +104,8 @@ impl Mistuning {
         };
         if model_of(&noise, &experiment.design).is_ok_and(same) {
             all.extend(noise.noise_parameters().map(|(path, _)| Mistuning::Noise(path)));
+            let mut plant = experiment.design.design.clone().unwrap_or_default();
+            all.extend(plant.noise_parameters().map(|(path, _)| Mistuning::Plant(path)));
         }
         let own = |i: &usize| axis.filter.f[(*i, *i)] == 1.0 && axis.filter.p0[(*i, *i)] > 0.0;
         let constants: Vec<usize> = (0..axis.filter.states.len()).filter(own).collect();
@@ -113,7 +117,7 @@ impl Mistuning {
     /// As in documents and on the command line.
     pub fn name(&self, axis: &AxisCourse) -> String {
         match self {
-            Mistuning::Noise(path) => path.clone(),
+            Mistuning::Noise(path) | Mistuning::Plant(path) => path.clone(),
             Mistuning::P0(i) => format!("P0 of {}", axis.filter.states[*i].name),
             Mistuning::X0(i) => format!("x0 of {}", axis.filter.states[*i].name),
         }
@@ -124,13 +128,17 @@ impl Mistuning {
         let design = &experiment.design.axes[number];
         let mut model = design.model.clone();
         match self {
-            Mistuning::Noise(path) => {
+            Mistuning::Noise(path) | Mistuning::Plant(path) => {
                 let mut noise = design.noise.clone();
-                let found = noise.noise_parameters().find(|(name, _)| name == path);
+                let mut plant = experiment.design.design.clone();
+                let found = match (self, &mut plant) {
+                    (Mistuning::Plant(_), Some(plant)) => plant.noise_parameters().find(|(name, _)| name == path),
+                    _ => noise.noise_parameters().find(|(name, _)| name == path),
+                };
                 if let Some((_, parameter)) = found {
                     parameter.value /= size;
                 }
-                model = model_of(&noise, &experiment.design)?;
+                model = model_in(&noise, plant, &experiment.design)?;
                 // P0 of a constant is what the filter claims, also where it was guessed from the noise
                 for i in 0..model.states.len() {
                     if design.model.f[(i, i)] == 1.0 {
@@ -151,7 +159,7 @@ impl Mistuning {
 
     fn measure(&self) -> Measure {
         match self {
-            Mistuning::Noise(_) | Mistuning::P0(_) => Measure::Factor,
+            Mistuning::Noise(_) | Mistuning::Plant(_) | Mistuning::P0(_) => Measure::Factor,
             Mistuning::X0(_) => Measure::Sigmas,
         }
     }

@@ -11,7 +11,7 @@ use super::document::axis;
 use super::measured::Range;
 use super::place::{self, KeyError, Object, Place};
 use super::{AxisParams, Measured, ParamsError};
-use crate::units::{Dimension, Quantity, Unit};
+use crate::units::{Dimension, Quantity, Unit, digits};
 
 /// Names of the plants, in documents and flags.
 pub const PLANTS: [&str; 5] = ["static", "angle", "rate", "vertical", "custom"];
@@ -144,6 +144,41 @@ impl PlantEntry {
                 Unit::parse(&output.unit).ok().map(|unit| unit.dimension())
             }
         }
+    }
+}
+
+/// An aid's rate may be this far, relatively, from a whole fraction of the sample rate.
+const RATE_TOLERANCE: f64 = 0.05;
+/// An aid is taken at least once in so many samples.
+const RAREST: f64 = 1e6;
+
+impl AidEntry {
+    /// Samples from one measurement to the next. Errors: a rate above the sample rate or no whole fraction of it.
+    pub fn every(&self, sample_rate_hz: f64) -> Result<usize, String> {
+        let Some(rate) = self.rate.as_ref().map(|m| m.si()) else { return Ok(1) };
+        let every = (sample_rate_hz / rate).round().max(1.0);
+        let possible = |every: f64| format!("{} Hz", digits(sample_rate_hz / every));
+        if rate > sample_rate_hz * (1.0 + RATE_TOLERANCE) || !every.is_finite() {
+            return Err(format!(
+                "its rate of {} Hz is above the sample rate of {} Hz",
+                digits(rate),
+                digits(sample_rate_hz)
+            ));
+        }
+        let off = sample_rate_hz / every / rate - 1.0;
+        if off.abs() > RATE_TOLERANCE {
+            return Err(format!(
+                "its rate of {} Hz is no whole fraction of the sample rate of {} Hz; near it are {} and {}",
+                digits(rate),
+                digits(sample_rate_hz),
+                possible(every),
+                possible(if off > 0.0 { every + 1.0 } else { (every - 1.0).max(1.0) })
+            ));
+        }
+        if every > RAREST {
+            return Err(format!("its rate of {} Hz is less than one measurement in a million samples", digits(rate)));
+        }
+        Ok(every as usize)
     }
 }
 

@@ -3,26 +3,27 @@
 use nalgebra::DVector;
 
 use super::trace::Trace;
-use super::{LAGS, NIS_BINS, sensors};
+use super::{LAGS, NIS_BINS, Options, Roles};
 use crate::consistency::low_frequency::{LowFrequency, time_constants};
 use crate::consistency::whiteness::Autocorrelation;
-use crate::filter::AxisDesign;
 use crate::filter::innovations::nearest_turn;
 use crate::filter::kalman::{Kalman, Update};
 use crate::filter::smoother::History;
+use crate::filter::{AxisDesign, Running};
 use crate::model::LinearModel;
 use crate::numerics::reduce::Sum;
 
 /// One axis in progress.
 #[derive(Clone, Debug)]
 pub(super) struct AxisReplay {
-    pub(super) kalman: Kalman,
-    /// Last usable value of the sensor, where the filter integrates it.
+    pub(super) filter: Running,
+    /// Last usable value of the input.
     input: Option<f64>,
     pub(super) channels: Vec<Channel>,
-    /// Measurements of the sensor itself; those after it are aids.
-    own: usize,
+    roles: Roles,
     gate: Option<f64>,
+    /// Measurements beyond the gate still move the estimate, as far as one at the gate.
+    clip: bool,
     /// Steps since the first sample.
     step: u64,
     started: bool,
@@ -70,15 +71,16 @@ pub(super) struct StartTest {
 }
 
 impl AxisReplay {
-    pub(super) fn new(design: &AxisDesign, gate: Option<f64>) -> AxisReplay {
+    pub(super) fn new(design: &AxisDesign, filter: Running, roles: Roles, options: &Options) -> AxisReplay {
         let model = &design.model;
         let settling = design.steady_state.settling_time / model.dt;
         AxisReplay {
-            kalman: Kalman::new(model),
+            filter,
             input: None,
             channels: (0..model.measurements.len()).map(|i| Channel::new(design, i)).collect(),
-            own: sensors(model),
-            gate,
+            roles,
+            gate: options.gate,
+            clip: options.clip,
             step: 0,
             started: false,
             start: StartTest::new(model, settling),
@@ -90,13 +92,13 @@ impl AxisReplay {
         }
     }
 
-    /// Measurements that are not of the sensor.
+    /// Columns beside the sensor's.
     pub(super) fn aids(&self) -> usize {
-        self.channels.len() - self.own
+        usize::from(self.roles.known_input) + self.channels.len() - self.roles.own
     }
 
     /// One row: the sensor's value, the samples missing before it, and one value per aid.
-    pub(super) fn step(&mut self, sensor: f64, missing: u64, time_s: f64, aids: impl Iterator<Item = f64>) {
+    pub(super) fn step(&mut self, sensor: f64, missing: u64, time_s: f64, mut aids: impl Iterator<Item = f64>) {
         self.samples += 1;
         if self.started {
             self.advance(missing);
@@ -105,7 +107,7 @@ impl AxisReplay {
         }
         self.started = true;
         self.channels.iter_mut().for_each(|channel| channel.last = None);
-        if self.own == 1 {
+        if self.roles.own == 1 {
             // taken at every n-th sample, and a value that is no number is a fault
             if self.step.is_multiple_of(self.channels[0].every) {
                 if sensor.is_finite() { self.update(0, sensor, time_s) } else { self.channels[0].skip() }
@@ -115,7 +117,13 @@ impl AxisReplay {
         } else {
             self.unusable += 1;
         }
-        for (index, z) in (self.own..).zip(aids) {
+        if self.roles.known_input {
+            match aids.next().filter(|u| u.is_finite()) {
+                Some(u) => self.input = Some(u),
+                None => self.unusable += 1,
+            }
+        }
+        for (index, z) in (self.roles.own..).zip(aids) {
             if z.is_finite() {
                 self.update(index, z, time_s);
             }
@@ -124,16 +132,20 @@ impl AxisReplay {
 
     fn update(&mut self, index: usize, z: f64, time_s: f64) {
         let channel = &mut self.channels[index];
-        let z = channel.nearest(z, &self.kalman.x);
-        let update = self.kalman.update(index, z, self.gate);
+        let z = channel.nearest(z, self.filter.x());
+        let update = self.filter.update(index, z, self.gate);
         channel.last = Some(update);
         let y = update.innovation / update.variance.sqrt();
         if !update.accepted {
-            if self.gate.is_some_and(|gate| y.abs() > gate) {
-                channel.rejected += 1;
-                channel.autocorrelation.skip(1);
-            } else {
-                channel.skip();
+            match self.gate.filter(|gate| y.abs() > *gate) {
+                Some(gate) => {
+                    channel.rejected += 1;
+                    channel.autocorrelation.skip(1);
+                    if self.clip {
+                        self.filter.nudge(index, y.signum() * gate * update.variance.sqrt());
+                    }
+                }
+                None => channel.skip(),
             }
             return;
         }
@@ -144,7 +156,7 @@ impl AxisReplay {
         channel.log_likelihood.add(update.log_likelihood);
         channel.autocorrelation.push(y);
         channel.low_frequency.push(y);
-        let (estimate, sigma) = of_row(&self.kalman, &channel.row);
+        let (estimate, sigma) = self.filter.of_row(&channel.row);
         channel.trace.push(time_s, z, estimate, sigma, y);
         channel.nis_histogram[((2.0 * update.nis) as usize).min(NIS_BINS - 1)] += 1;
     }
@@ -152,7 +164,7 @@ impl AxisReplay {
     /// Predictions to the next sample, with `missing` samples in between.
     fn advance(&mut self, missing: u64) {
         let steps = missing.saturating_add(1);
-        self.kalman.advance(steps, self.input);
+        self.filter.advance(steps, self.input);
         if let Some(history) = &mut self.history {
             history.row(steps, self.input);
         }
@@ -160,25 +172,12 @@ impl AxisReplay {
         if missing > 0 {
             self.gaps += 1;
             self.missing = self.missing.saturating_add(missing);
-            for channel in &mut self.channels[..self.own] {
+            for channel in &mut self.channels[..self.roles.own] {
                 channel.autocorrelation.skip(missing / channel.every);
             }
         }
         self.step = self.step.saturating_add(steps);
     }
-}
-
-/// d x and √(d P dᵀ).
-pub(super) fn of_row(kalman: &Kalman, row: &[f64]) -> (f64, f64) {
-    let (x, p) = (&kalman.x, &kalman.p);
-    let (mut mean, mut variance) = (0.0, 0.0);
-    for (i, di) in row.iter().enumerate() {
-        mean += di * x[i];
-        for (j, dj) in row.iter().enumerate() {
-            variance += di * dj * p[(i, j)];
-        }
-    }
-    (mean, variance.max(0.0).sqrt())
 }
 
 impl Channel {

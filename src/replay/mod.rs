@@ -18,9 +18,11 @@ use serde::Serialize;
 
 use crate::consistency::{Test, Verdict};
 use crate::filter::smoother::{History, Smoothed, smooth};
-use crate::filter::{AxisDesign, FilterDesign};
+use crate::filter::{AxisDesign, FilterDesign, Form, Running};
 use crate::input::Block;
 use crate::model::{LinearModel, Named};
+use crate::numerics::linalg::LinalgError;
+use crate::params::PlantEntry;
 use crate::units::Quantity;
 
 use axis::AxisReplay;
@@ -38,11 +40,14 @@ pub struct Options {
     pub alpha: f64,
     /// Reject samples with |ν| > gate·√S.
     pub gate: Option<f64>,
+    /// Such a sample still moves the estimate, as far as one at the gate would.
+    pub clip: bool,
+    pub form: Form,
 }
 
 impl Default for Options {
     fn default() -> Options {
-        Options { alpha: 0.01, gate: None }
+        Options { alpha: 0.01, gate: None, clip: false, form: Form::Joseph }
     }
 }
 
@@ -71,29 +76,50 @@ pub struct LogShape {
     pub aids: usize,
 }
 
-/// A measurement of a design that is not of its sensor.
+/// A measurement of a design that is not of its sensor, or an input that is known exactly.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Aid {
     pub axis: String,
     pub measurement: Named,
 }
 
-/// What a log must have beside the sensor, axis by axis. Errors: a custom plant with more than the sensor.
+/// What a log must have beside the sensor, axis by axis: an input that is not the sensor, then the measurements that are not. Errors: a custom
+/// plant with several inputs, or one whose design is not told.
 pub fn aids(design: &FilterDesign) -> Result<Vec<Aid>, ReplayError> {
-    let more = |axis: &AxisDesign| axis.model.inputs.len() + axis.model.measurements.len() > 1;
-    if design.plant == "custom" && design.axes.iter().any(more) {
-        return Err(ReplayError::Custom);
+    let mut all = Vec::new();
+    for axis in &design.axes {
+        let roles = Roles::new(design, &axis.model)?;
+        let known = axis.model.inputs.iter().filter(|_| roles.known_input);
+        let beside = known.chain(&axis.model.measurements[roles.own..]);
+        all.extend(beside.map(|named| Aid { axis: axis.name.clone(), measurement: named.clone() }));
     }
-    let of_axis = |axis: &AxisDesign| {
-        let aids = axis.model.measurements[sensors(&axis.model)..].iter();
-        aids.map(|measurement| Aid { axis: axis.name.clone(), measurement: measurement.clone() }).collect::<Vec<_>>()
-    };
-    Ok(design.axes.iter().flat_map(of_axis).collect())
+    Ok(all)
 }
 
-/// Measurements that are of the sensor itself: the first, unless the sensor is an input.
-fn sensors(model: &LinearModel) -> usize {
-    usize::from(model.inputs.is_empty())
+/// What the sensor is to a filter.
+#[derive(Clone, Copy, Debug)]
+struct Roles {
+    /// Measurements that are of the sensor itself: the first, unless the sensor is an input.
+    own: usize,
+    /// The input is a column of its own.
+    known_input: bool,
+}
+
+impl Roles {
+    fn new(design: &FilterDesign, model: &LinearModel) -> Result<Roles, ReplayError> {
+        let is_input = match design.design.as_ref().map(|design| &design.plant) {
+            Some(PlantEntry::Custom(entry)) => model.inputs.iter().any(|input| input.name == entry.sensor),
+            _ if design.plant == "custom" && model.inputs.len() + model.measurements.len() > 1 => {
+                return Err(ReplayError::CustomUntold);
+            }
+            _ => !model.inputs.is_empty(),
+        };
+        if model.inputs.len() > 1 {
+            let inputs = model.inputs.iter().map(|input| input.name.as_str()).collect::<Vec<_>>().join(", ");
+            return Err(ReplayError::Inputs { inputs });
+        }
+        Ok(Roles { own: usize::from(!is_input), known_input: !is_input && !model.inputs.is_empty() })
+    }
 }
 
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -116,10 +142,13 @@ pub enum ReplayError {
     )]
     Aids { plant: String, names: String, found: usize },
     #[error(
-        "the filter is for a custom plant with an input or a measurement that is not the sensor's; replay handles the plants static, angle, \
-         rate and vertical, montecarlo judges this one on simulated runs"
+        "the filter is for a custom plant, and its 'design' section, which says what the sensor is, is not there; write it with tune"
     )]
-    Custom,
+    CustomUntold,
+    #[error("the plant has the inputs {inputs}; replay handles one, montecarlo judges this filter on simulated runs")]
+    Inputs { inputs: String },
+    #[error("axis '{axis}': Q and P0 have no square root: {source}")]
+    SquareRoot { axis: String, source: LinalgError },
     #[error("{name} is {value}, expected {expected}")]
     Option { name: &'static str, value: f64, expected: &'static str },
 }
@@ -315,11 +344,17 @@ impl Replayer {
             return Err(ReplayError::Aids { plant: design.plant.clone(), names: names.join(", "), found: log.aids });
         }
         let assigned = axes::assign(design, log)?;
+        let start = |axis: &AxisDesign| {
+            let filter = Running::new(options.form, axis)
+                .map_err(|source| ReplayError::SquareRoot { axis: axis.name.clone(), source })?;
+            Ok(AxisReplay::new(axis, filter, Roles::new(design, &axis.model)?, &options))
+        };
+        let axes = design.axes.iter().map(start).collect::<Result<Vec<_>, ReplayError>>()?;
         Ok(Replayer {
             options,
             log_axes: assigned.iter().map(|&i| log.axes[i].clone()).collect(),
             assigned,
-            axes: design.axes.iter().map(|axis| AxisReplay::new(axis, options.gate)).collect(),
+            axes,
             design: design.clone(),
         })
     }
@@ -341,7 +376,7 @@ impl Replayer {
             let aids: Vec<&[f64]> = extra.by_ref().take(axis.aids()).map(Vec::as_slice).collect();
             let mut output = outputs.as_mut().and_then(Iterator::next);
             if let Some(output) = &mut output {
-                output.clear(axis.kalman.x.len(), axis.channels.len());
+                output.clear(axis.filter.x().len(), axis.channels.len());
             }
             let values = block.values.get(column).map_or(&[][..], Vec::as_slice);
             for (row, ((z, missing), time)) in values.iter().zip(&block.missing).zip(&block.time_s).enumerate() {
@@ -387,10 +422,10 @@ impl AxisEstimates {
     }
 
     fn push(&mut self, axis: &AxisReplay) {
-        let kalman = &axis.kalman;
+        let x = axis.filter.x();
         for (i, (states, sigmas)) in self.states.iter_mut().zip(&mut self.sigmas).enumerate() {
-            states.push(kalman.x[i]);
-            sigmas.push(kalman.p[(i, i)].max(0.0).sqrt());
+            states.push(x[i]);
+            sigmas.push(axis.filter.sigma(i));
         }
         for (update, channel) in self.updates.iter_mut().zip(&axis.channels) {
             let (innovation, sigma, nis) =

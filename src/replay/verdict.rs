@@ -6,8 +6,10 @@
 //! low-frequency spectrum) and, behind a gate, `rejected`. Holm's adjustment runs over all tests and axes;
 //! [`effect::judge`] states how p-values and effect sizes make the verdict.
 
-use super::axis::{AxisReplay, Channel, of_row};
-use super::{AxisResult, FinalState, LowFrequencySummary, Nis, ReplayResult, Replayer, Sight, Start, WhitenessSummary};
+use super::axis::{AxisReplay, Channel};
+use super::{
+    AxisResult, FinalState, LowFrequencySummary, Nis, Options, ReplayResult, Replayer, Sight, Start, WhitenessSummary,
+};
 use crate::consistency::effect::{self, Effect};
 use crate::consistency::normalized::{gated_moments, moment_matched};
 use crate::consistency::whiteness::Whiteness;
@@ -33,7 +35,7 @@ pub(super) fn conclude(replayer: Replayer) -> ReplayResult {
             if let Some(reason) = view.too_short() {
                 short.push(reason);
             }
-            let (result, its_tests) = axis_result(&view, log_axis.clone(), options.alpha, options.gate);
+            let (result, its_tests) = axis_result(&view, log_axis.clone(), &options);
             results.push(result);
             tests.extend(its_tests);
         }
@@ -93,7 +95,7 @@ impl View<'_> {
     }
 }
 
-fn axis_result(view: &View<'_>, log_axis: String, alpha: f64, gate: Option<f64>) -> (AxisResult, Vec<Test>) {
+fn axis_result(view: &View<'_>, log_axis: String, options: &Options) -> (AxisResult, Vec<Test>) {
     let View { axis, channel, design, index } = *view;
     let name = view.name();
     let name = name.as_str();
@@ -131,8 +133,10 @@ fn axis_result(view: &View<'_>, log_axis: String, alpha: f64, gate: Option<f64>)
     if accepted + channel.rejected < FEWEST_SAMPLES {
         return (result, tests);
     }
+    let Options { alpha, gate, .. } = *options;
     let (expected, variance) = gate.map_or((1.0, 2.0), gated_moments);
-    if let Some(gate) = gate {
+    // a robust filter is one that expects outliers
+    if let Some(gate) = gate.filter(|_| !options.clip) {
         tests.push(rejected_test(name, gate, channel.rejected, accepted, alpha));
     }
     if accepted < FEWEST_SAMPLES {
@@ -200,7 +204,7 @@ fn final_output(axis: &AxisReplay, design: &AxisDesign) -> FinalState {
         }
     };
     let (name, unit) = named.unwrap_or_default();
-    let (value, sigma) = of_row(&axis.kalman, &row);
+    let (value, sigma) = axis.filter.of_row(&row);
     FinalState { name, unit, value, sigma }
 }
 
@@ -210,8 +214,8 @@ fn final_state(axis: &AxisReplay, design: &AxisDesign) -> Vec<FinalState> {
         .map(|(i, state)| FinalState {
             name: state.name.clone(),
             unit: state.unit.clone(),
-            value: axis.kalman.x[i],
-            sigma: axis.kalman.p[(i, i)].max(0.0).sqrt(),
+            value: axis.filter.x()[i],
+            sigma: axis.filter.sigma(i),
         })
         .collect()
 }

@@ -22,9 +22,13 @@
 //! with i counting the terms of that kind on the axis from 0. Adding an axis, a term of another kind or a later term of
 //! the same kind changes no other number.
 
+mod flight;
+
 use crate::noise::{Kind, SamplePath};
 use crate::numerics::random::{StreamId, normal, stream};
 use crate::params::{AxisParams, Params};
+
+pub use flight::{Flight, FlightBlock};
 
 /// More is refused: 300 years at 100 Hz.
 pub const MAX_SAMPLES: u64 = 1_000_000_000_000;

@@ -8,8 +8,8 @@ use serde::Serialize;
 
 use crate::filter::Kalman;
 use crate::filter::steady_state::{SteadyState, SteadyStateError, steady_state};
-use crate::model::LinearModel;
 use crate::model::observability::undriven_states;
+use crate::model::{DRIFT, LinearModel};
 use crate::numerics::linalg::{LinalgError, symmetrise};
 use crate::numerics::riccati::lyapunov;
 
@@ -180,30 +180,39 @@ pub(super) fn settled(model: &LinearModel, kept: &[usize]) -> Result<LinearModel
     Ok(alone)
 }
 
-/// Frequency in Hz at which the estimate of the whole drift follows the measurement with half the power it has at zero frequency; of a
-/// sensor at rest.
+/// Frequency in Hz at which the estimate follows the measurement with half the power it has at zero frequency: that of the whole drift
+/// of a sensor at rest, that of the first state of a plant. Below it a plant's state follows what measures it, above it the sensor that is
+/// integrated, if there is one.
 ///
-/// T(ω) = d [I − (I − K H) F e^(−jω dt)]⁻¹ K. For one pole λ near one it is (1 − λ)/(2π dt). `None` when the steady gain is zero or
-/// the estimate follows up to half the sample rate.
+/// T(ω) = d [I − (I − K H) F e^(−jω dt)]⁻¹ K. For one pole λ near one it is (1 − λ)/(2π dt). With one measurement at every n-th sample F is
+/// that of n samples and dt their length; several measurements of the same thing move together. `None` when the steady gain is zero, the estimate
+/// follows up to half the rate of the measurements, or these are of several rates or units.
 pub fn bandwidth_hz(model: &LinearModel, steady: &SteadyState) -> Option<f64> {
-    let drift = model.drift_row();
-    let kept = driven(model, &drift);
-    if kept.is_empty() || !model.outputs.is_empty() {
+    let output = model.outputs.iter().find(|output| output.name != DRIFT);
+    let row = output.map_or_else(|| model.drift_row(), |o| DMatrix::from_row_slice(1, o.row.len(), &o.row));
+    let kept = driven(model, &row);
+    let several = model.every.iter().any(|every| *every as u64 != steady.period);
+    let unlike = model.measurements.iter().any(|m| m.unit != model.measurements[0].unit);
+    if kept.is_empty() || several || unlike {
         return None;
     }
     let all: Vec<usize> = (0..model.h.nrows()).collect();
     let h = part(&model.h, &all, &kept);
-    let d = part(&drift, &[0], &kept);
-    let k = part(&steady.gain, &kept, &all);
-    let a = (DMatrix::identity(kept.len(), kept.len()) - &k * &h) * part(&model.f, &kept, &kept);
+    let d = part(&row, &[0], &kept);
+    let gains = part(&steady.gain, &kept, &all);
+    let k = gains.column_sum();
+    let f = part(&model.f, &kept, &kept).pow(u32::try_from(steady.period).ok()?);
+    let a = (DMatrix::identity(kept.len(), kept.len()) - gains * &h) * f;
+    let dt = model.dt * steady.period as f64;
     let power = |f_hz: f64| -> Option<f64> {
-        let turn = Complex::from_polar(1.0, -TAU * f_hz * model.dt);
+        let turn = Complex::from_polar(1.0, -TAU * f_hz * dt);
         let complex = |x: &DMatrix<f64>| x.map(|v| Complex::new(v, 0.0));
         let loop_matrix = DMatrix::identity(kept.len(), kept.len()) - complex(&a) * turn;
-        Some((complex(&d) * loop_matrix.lu().solve(&complex(&k))?)[(0, 0)].norm_sqr())
+        let k = k.map(|v| Complex::new(v, 0.0));
+        Some((complex(&d) * loop_matrix.lu().solve(&k)?)[(0, 0)].norm_sqr())
     };
     let half = 0.5 * power(0.0)?;
-    let nyquist = 0.5 / model.dt;
+    let nyquist = 0.5 / dt;
     // upward from far below the slowest pole
     let mut low = nyquist;
     for (re, im) in &steady.poles {

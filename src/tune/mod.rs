@@ -3,10 +3,12 @@
 //! `sensor` turns the parameters of an axis into a linear model (merging what no filter can tell apart), `plant` joins it with the
 //! documented plant and its aids, `prediction` propagates its
 //! covariance over any time, `closed_loop` splits the final variance into its causes and finds the bandwidth,
-//! `objective` chooses the physical `parameters`, `under_truth` says what the design does when the sensor is another.
+//! `objective` chooses the physical `parameters`, `insight` says what other parts would buy, `under_truth` says what the design does when the
+//! sensor is another.
 
 mod closed_loop;
 mod flicker;
+mod insight;
 pub mod objective;
 mod parameters;
 mod plant;
@@ -29,6 +31,7 @@ use crate::units::Quantity;
 
 pub use closed_loop::{Share, bandwidth_hz, error_budget};
 pub use flicker::FlickerApproximation;
+pub use insight::{FACTORS, Insight, MISTAKES, Mistake, Observed, OutputInsight, WHOLE_SENSOR, Worth, insight};
 pub use prediction::{Predicted, predicted_sigma};
 pub use under_truth::{ErrorOverTime, Tendency, UnderTruth, under_truth};
 

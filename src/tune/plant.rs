@@ -16,8 +16,6 @@ const ANY_ANGLE: f64 = std::f64::consts::PI / 1.732_050_807_568_877_2;
 const ANY_TILT: f64 = std::f64::consts::PI / 6.0;
 /// Spread of a rate nobody described: 100 deg/s.
 const ANY_RATE: f64 = 100.0 * std::f64::consts::PI / 180.0;
-/// An aid's rate may be this far, relatively, from a whole fraction of the sample rate.
-const RATE_TOLERANCE: f64 = 0.05;
 
 /// A plant joined with its sensors, and the decisions that led to it.
 #[derive(Clone, Debug)]
@@ -165,41 +163,15 @@ fn aid_part(aid: &AidEntry, entry: &PlantEntry, plant: &Plant, warnings: &mut Ve
         PlantEntry::Static => return Err(wrong("the plant 'static' has nothing to aid; choose a plant".into())),
         PlantEntry::Angle { .. } | PlantEntry::Rate { .. } => 0,
     };
-    let every = every(aid, 1.0 / plant.dt, warnings).map_err(wrong)?;
+    let sample_rate_hz = 1.0 / plant.dt;
+    let every = aid.every(sample_rate_hz).map_err(wrong)?;
+    let taken_at = sample_rate_hz / every as f64;
+    if aid.rate.as_ref().is_some_and(|rate| (taken_at / rate.si() - 1.0).abs() > 1e-6) {
+        warnings.push(format!("{} is taken every {every} samples, at {} Hz", aid.name, digits(taken_at)));
+    }
     let drift = aid.gauss_markov.as_ref().map(|d| [d.std_dev.si(), d.correlation_time.si()]);
     let errors = aid_errors(plant.outputs[output].clone(), aid.std_dev.si(), drift, plant.dt)?;
     Ok(Part { name: aid.name.clone(), errors, port: Port::Output(output), every })
-}
-
-/// Samples from one measurement of the aid to the next.
-fn every(aid: &AidEntry, sample_rate_hz: f64, warnings: &mut Vec<String>) -> Result<usize, String> {
-    let Some(rate) = aid.rate.as_ref().map(|m| m.si()) else { return Ok(1) };
-    let every = (sample_rate_hz / rate).round().max(1.0);
-    let possible = |every: f64| format!("{} Hz", digits(sample_rate_hz / every));
-    if rate > sample_rate_hz * (1.0 + RATE_TOLERANCE) || !every.is_finite() {
-        return Err(format!(
-            "its rate of {} Hz is above the sample rate of {} Hz",
-            digits(rate),
-            digits(sample_rate_hz)
-        ));
-    }
-    let off = sample_rate_hz / every / rate - 1.0;
-    if off.abs() > RATE_TOLERANCE {
-        return Err(format!(
-            "its rate of {} Hz is no whole fraction of the sample rate of {} Hz; near it are {} and {}",
-            digits(rate),
-            digits(sample_rate_hz),
-            possible(every),
-            possible(if off > 0.0 { every + 1.0 } else { (every - 1.0).max(1.0) })
-        ));
-    }
-    if every > crate::filter::cycle::LONGEST_PERIOD as f64 {
-        return Err(format!("its rate of {} Hz is less than one measurement in a million samples", digits(rate)));
-    }
-    if off.abs() > 1e-6 {
-        warnings.push(format!("{} is taken every {every} samples, at {}", aid.name, possible(every)));
-    }
-    Ok(every as usize)
 }
 
 /// A drift that changes between two measurements of the fastest aid is not followed.

@@ -37,10 +37,23 @@ pub(super) fn drift_settling_time(
     predicted: &Predicted,
     final_sigma: f64,
 ) -> Result<Option<f64>, LinalgError> {
+    if final_sigma == 0.0 {
+        return Ok(None);
+    }
     let outside = |sigma: f64| (sigma / final_sigma - 1.0).abs() > SETTLED;
-    let Some(last) = predicted.total.iter().rposition(|&sigma| outside(sigma)) else {
-        return Ok(Some(0.0).filter(|_| final_sigma > 0.0));
-    };
+    settled_after(model, predicted, &predicted.total, |p| drift_sigma(model, p), outside)
+}
+
+/// Time in s after which a sigma is never `outside` again; `None` when that is beyond the times of `predicted`. `sigmas` are those at
+/// these times, `sigma_of` takes them from a covariance.
+pub(super) fn settled_after(
+    model: &LinearModel,
+    predicted: &Predicted,
+    sigmas: &[f64],
+    sigma_of: impl Fn(&DMatrix<f64>) -> f64,
+    outside: impl Fn(f64) -> bool,
+) -> Result<Option<f64>, LinalgError> {
+    let Some(last) = sigmas.iter().rposition(|&sigma| outside(sigma)) else { return Ok(Some(0.0)) };
     let Some(inside) = predicted.time_s.get(last + 1) else { return Ok(None) };
     let steps = |time: f64| (time / model.dt).round() as u64;
     // between two samples at which all measurements are taken the sigma is another
@@ -50,7 +63,7 @@ pub(super) fn drift_settling_time(
     while high - low > 1 {
         let middle = low + (high - low) / 2;
         let p = covariances(model, &[middle * unit])?;
-        if p.iter().any(|p| outside(drift_sigma(model, p))) { low = middle } else { high = middle }
+        if p.iter().any(|p| outside(sigma_of(p))) { low = middle } else { high = middle }
     }
     Ok(Some((high * unit) as f64 * model.dt))
 }

@@ -1,10 +1,12 @@
 //! The square-root form: the results of the Joseph form where that is sound, and right ones where it is not.
 
-use kfdesign::filter::{Kalman, SquareRoot};
+use kfdesign::filter::Kalman;
 use kfdesign::model::LinearModel;
 use kfdesign::numerics::random::{StreamId, stream};
 use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
+
+type SquareRoot = kfdesign::filter::SquareRoot<f64>;
 
 use super::{bias_and_drift, drift, model, named};
 

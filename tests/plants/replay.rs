@@ -12,11 +12,11 @@ use serde_json::Value;
 use super::gyro;
 use crate::support::Bench;
 
-const DEG: f64 = PI / 180.0;
-const DT: f64 = 0.01;
+pub(super) const DEG: f64 = PI / 180.0;
+pub(super) const DT: f64 = 0.01;
 
 /// Ten minutes of the sensor with this true rate: measured and true rate, rad/s, and the true bias.
-fn flight(params: &Params, true_rate: TrueRate) -> (Vec<f64>, Vec<f64>, f64) {
+pub(super) fn flight(params: &Params, true_rate: TrueRate) -> (Vec<f64>, Vec<f64>, f64) {
     let (seed, samples) = (12, 60_000);
     let scenario = Scenario {
         seed,
@@ -35,7 +35,7 @@ fn flight(params: &Params, true_rate: TrueRate) -> (Vec<f64>, Vec<f64>, f64) {
 }
 
 /// A log of columns with this header; NaN is an empty field.
-fn csv(header: &str, columns: &[&[f64]]) -> String {
+pub(super) fn csv(header: &str, columns: &[&[f64]]) -> String {
     let mut text = format!("{header}\n");
     for k in 0..columns[0].len() {
         let field = |c: &&[f64]| if c[k].is_nan() { String::new() } else { format!("{:?}", c[k]) };
@@ -45,7 +45,7 @@ fn csv(header: &str, columns: &[&[f64]]) -> String {
     text
 }
 
-fn time() -> Vec<f64> {
+pub(super) fn time() -> Vec<f64> {
     (0..60_000).map(|k| f64::from(k) * DT).collect()
 }
 
@@ -63,7 +63,7 @@ fn wandering(sigma: f64, tc: f64, number: u32) -> Vec<f64> {
         .collect()
 }
 
-fn state(axis: &Value, name: &str) -> (f64, f64) {
+pub(super) fn state(axis: &Value, name: &str) -> (f64, f64) {
     let states = axis["final_state"].as_array().unwrap();
     let state = states.iter().find(|s| s["name"] == name).unwrap_or_else(|| panic!("{name} among {states:?}"));
     (state["value"].as_f64().unwrap(), state["sigma"].as_f64().unwrap())
@@ -255,9 +255,9 @@ fn a_log_without_what_the_filter_measures_is_refused() {
             "{flags}: {out:?}"
         );
     };
-    refused("", &["the filter measures heading beside the sensor", "--aid heading=COLUMN"]);
+    refused("", &["the filter needs heading beside the sensor", "--aid heading=COLUMN"]);
     refused("--aid yaw", &["--aid yaw: expected NAME=COLUMN"]);
-    refused("--aid star=yaw", &["no measurement 'star'", "it has heading"]);
+    refused("--aid star=yaw", &["no measurement or input 'star'", "it has heading"]);
     refused("--aid heading=yaw", &["no unit is known for column 'yaw'", "--aid heading=yaw:deg"]);
     refused("--aid heading=yaw:deg/s", &["an angular rate, expected an angle"]);
     refused("--aid heading=yaw,mag", &["2 columns for 1 axes"]);

@@ -12,8 +12,8 @@ use crate::units::{Dimension, Quantity};
 /// The plant and what aids it.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Plant")]
-pub(super) struct PlantFlags {
-    /// What the sensor is part of: static, angle, rate, vertical, or a design FILE.json [default: the design of PARAMS, else static]
+pub(in crate::cli) struct PlantFlags {
+    /// What the sensor is part of: static, angle, rate, vertical, or a design FILE.json [default: the design of the parameters, else static]
     #[arg(long, value_name = "PLANT")]
     pub(super) plant: Option<String>,
     /// A measurement of the plant: "[NAME:] SIGMA [@ RATE] [, SIGMA over TIME]", for example "heading: 2 deg @ 1 Hz, 1 deg over 60 s"; or
@@ -35,7 +35,7 @@ impl PlantFlags {
     }
 
     /// `None`: no flag was given, the parameters decide.
-    pub(super) fn design(&self, params: &Params) -> anyhow::Result<Option<Design>> {
+    pub(in crate::cli) fn design(&self, params: &Params) -> anyhow::Result<Option<Design>> {
         let aids: Vec<&String> = self.aid.iter().filter(|text| !text.contains('=')).collect();
         let nothing = self.plant.is_none() && aids.is_empty() && self.motion.is_none();
         if nothing && self.accelerometer.is_none() {

@@ -1,7 +1,7 @@
 //! Figures and the report page of a design.
 
 use super::text::{self, Group, View, shown};
-use super::truth;
+use super::{insight, truth};
 use crate::cli::output::{digits, shown_unit};
 use crate::montecarlo::{AxisOutcome, Outcome};
 use crate::replay::ReplayResult;
@@ -12,7 +12,13 @@ use crate::units::Quantity;
 
 /// Predicted sigma of every axis, one below the other.
 pub(super) fn sheet(view: &View<'_>) -> String {
-    let figures: Vec<String> = view.groups().iter().map(|g| sigma(g, view.params.quantity)).collect();
+    let quantity = view.params.quantity;
+    let of_group = |g: &Group<'_>| {
+        let worth =
+            view.insight(g).into_iter().flat_map(|i| &i.outputs).map(|output| insight::figure(g, output, quantity));
+        std::iter::once(sigma(g, quantity)).chain(worth).collect::<Vec<_>>()
+    };
+    let figures: Vec<String> = view.groups().iter().flat_map(of_group).collect();
     figure::sheet("Tuned filter", &figures)
 }
 
@@ -30,6 +36,7 @@ pub(super) fn page(view: &View<'_>, replays: &[ReplayResult]) -> Page {
         provenance.push(("source of the parameters".to_string(), note));
     }
     let mut sections: Vec<Section> = view.groups().iter().map(|g| section(g, params.quantity)).collect();
+    sections.extend(view.groups().iter().filter_map(|g| Some(insight::section(g, view.insight(g)?, params.quantity))));
     sections.extend(truth::sections(view));
     let tests = outcome.tests.iter().map(|t| {
         vec![

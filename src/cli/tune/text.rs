@@ -1,14 +1,14 @@
 //! A design as a person reads it.
 
-use super::{Truth, truth};
+use super::{Truth, insight, truth};
 use crate::cli::output::{digits, shown_unit, table};
 use crate::consistency::Verdict;
 use crate::filter::AxisDesign;
-use crate::model::LinearModel;
+use crate::model::{DRIFT, LinearModel};
 use crate::montecarlo::Outcome;
 use crate::params::Params;
 use crate::replay::ReplayResult;
-use crate::tune::{AxisReport, Share, Tuned};
+use crate::tune::{AxisReport, Insight, Share, Tuned};
 use crate::units::{Quantity, Unit};
 
 /// Everything that is shown.
@@ -18,6 +18,8 @@ pub(super) struct View<'a> {
     pub(super) tuned: &'a Tuned,
     pub(super) verification: &'a Outcome,
     pub(super) truth: Option<&'a Truth>,
+    /// Of every axis, if asked for.
+    pub(super) insights: &'a [Insight],
 }
 
 /// One or more axes with the same design.
@@ -47,6 +49,12 @@ impl View<'_> {
             }
         }
         groups
+    }
+}
+
+impl<'a> View<'a> {
+    pub(super) fn insight(&self, group: &Group<'_>) -> Option<&'a Insight> {
+        self.insights.iter().find(|insight| Some(&insight.axis.as_str()) == group.names.first())
     }
 }
 
@@ -120,6 +128,9 @@ pub(super) fn design(view: &View<'_>) -> String {
             table(&header, &sigma_rows(&group, params.quantity))
         ));
         out.push('\n');
+        if let Some(of_axis) = view.insight(&group) {
+            out.push_str(&insight::text(&group, of_axis, params.quantity));
+        }
         for sentence in &group.report.observability {
             out.push_str(&format!("{sentence}\n"));
         }
@@ -219,11 +230,22 @@ pub(super) fn facts(group: &Group<'_>, quantity: Quantity) -> Vec<(&'static str,
             ),
         ),
     ]);
-    if model.outputs.is_empty() {
-        let bandwidth = report.bandwidth_hz.map_or_else(
-            || "0: the filter follows no drift".into(),
-            |f| format!("{} Hz (half power of the drift estimate)", digits(f)),
-        );
+    let output = model.outputs.iter().find(|output| output.name != DRIFT);
+    let bandwidth = match (report.bandwidth_hz, output) {
+        (Some(f), None) => Some(format!("{} Hz (half power of the drift estimate)", digits(f))),
+        (None, None) => Some("0: the filter follows no drift".into()),
+        (Some(f), Some(output)) => {
+            let above = if model.inputs.is_empty() {
+                String::new()
+            } else {
+                format!(", above it the {}", model.inputs[0].name)
+            };
+            let (hz, state, measurement) = (digits(f), &output.name, &model.measurements[0].name);
+            Some(format!("{hz} Hz: below it the {state} follows the {measurement}{above} (half power)"))
+        }
+        (None, Some(_)) => None,
+    };
+    if let Some(bandwidth) = bandwidth {
         facts.insert(facts.len() - 1, ("bandwidth", bandwidth));
     }
     facts

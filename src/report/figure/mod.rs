@@ -13,6 +13,7 @@ mod scale;
 mod sheet;
 mod style;
 mod trace;
+mod worth;
 
 pub use allan::{Allan, AllanPoint, allan};
 pub use budget::{BudgetItem, error_budget};
@@ -24,6 +25,7 @@ pub use ratio::{SpectrumRatio, spectrum_ratio};
 pub use sheet::sheet;
 pub use style::style_sheet;
 pub use trace::{Estimate, Innovations, Sigma, SigmaState, estimate, innovations, sigma};
+pub use worth::{Worth, worth};
 
 /// A named line.
 #[derive(Clone, Debug, Default, PartialEq)]

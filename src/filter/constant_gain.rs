@@ -1,0 +1,75 @@
+//! The filter that never computes a covariance: the gains of the steady state from the first measurement on.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::kalman::{Kalman, Update};
+use super::steady_state::SteadyState;
+use crate::model::LinearModel;
+
+/// x ← F x + G u, x ← x + K_i ν: a gain per measurement, that of a sample at which all are taken, one after the other.
+///
+/// Where measurements have several rates the true gains differ a little from sample to sample. A state that nothing drives (a constant bias) has gain
+/// zero and keeps its x0; until the filter has settled its error is larger than the sigma it claims, that of the steady state.
+#[derive(Clone, Debug)]
+pub struct ConstantGain {
+    /// Holds x, and the claimed P.
+    kalman: Kalman,
+    h: DMatrix<f64>,
+    /// Gain and S of every measurement.
+    gains: Vec<(DVector<f64>, f64)>,
+}
+
+impl ConstantGain {
+    /// Starts at x0.
+    pub fn new(model: &LinearModel, steady: &SteadyState) -> ConstantGain {
+        let mut kalman = Kalman::new(model);
+        kalman.p.copy_from(&steady.predicted_covariance);
+        let mut gains = Vec::with_capacity(model.measurements.len());
+        for (i, h) in model.h.row_iter().enumerate() {
+            let variance = (h * &kalman.p * h.transpose())[(0, 0)] + model.r[(i, i)];
+            gains.push((&kalman.p * h.transpose() / variance, variance));
+            kalman.update(i, 0.0, None);
+        }
+        // what nothing drives stays as uncertain as it was
+        for i in (0..model.x0.len()).filter(|&i| steady.predicted_covariance[(i, i)] == 0.0) {
+            kalman.p[(i, i)] = model.p0[(i, i)];
+        }
+        kalman.x.copy_from(&model.x0);
+        ConstantGain { kalman, h: model.h.clone(), gains }
+    }
+
+    pub fn x(&self) -> &DVector<f64> {
+        &self.kalman.x
+    }
+
+    /// The claimed covariance: P(k|k) of the steady state, P0 of what nothing drives.
+    pub fn p(&self) -> &DMatrix<f64> {
+        &self.kalman.p
+    }
+
+    /// As [`Kalman::advance`], x alone.
+    pub fn advance(&mut self, steps: u64, input: Option<f64>) {
+        let p = self.kalman.p.clone();
+        self.kalman.advance(steps, input);
+        self.kalman.p = p;
+    }
+
+    /// As [`Kalman::update`] with the constant gain and S.
+    pub fn update(&mut self, index: usize, z: f64, gate: Option<f64>) -> Update {
+        let (gain, variance) = &self.gains[index];
+        let innovation = z - self.h.row(index).transpose().dot(&self.kalman.x);
+        let nis = innovation * innovation / variance;
+        let log_likelihood = -0.5 * ((std::f64::consts::TAU * variance).ln() + nis);
+        let accepted =
+            log_likelihood.is_finite() && innovation.abs() <= gate.unwrap_or(f64::INFINITY) * variance.sqrt();
+        if accepted {
+            self.kalman.x.axpy(innovation, gain, 1.0);
+        }
+        Update { innovation, variance: *variance, nis, log_likelihood, accepted }
+    }
+
+    /// As [`Kalman::nudge`].
+    pub fn nudge(&mut self, index: usize, innovation: f64) {
+        self.kalman.x.axpy(innovation, &self.gains[index].0, 1.0);
+    }
+}

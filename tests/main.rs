@@ -12,6 +12,7 @@ mod compare;
 mod consistency;
 mod deployment;
 mod docs;
+mod export;
 mod filter;
 mod identify;
 mod input;

@@ -132,11 +132,13 @@ fn van_loan_over_a_thousand_time_constants_is_the_stationary_covariance() {
     assert!(van_loan(&DMatrix::from_element(1, 1, f64::NAN), &DMatrix::zeros(1, 1), 1.0).is_err());
 }
 
-/// A continuous system of 1 to 4 states with entries in ±2, and L with Qc = L Lᵀ.
+/// A continuous system of 1 to 20 states with eigenvalues within some ±2 (entries in ±2/√n), and L with Qc = L Lᵀ.
 fn continuous_system() -> impl Strategy<Value = (DMatrix<f64>, DMatrix<f64>)> {
-    (1_usize..=4).prop_flat_map(|n| {
+    (1_usize..=20).prop_flat_map(|n| {
         let entries = || prop::collection::vec(-2.0..2.0_f64, n * n);
-        (entries(), entries()).prop_map(move |(a, l)| (DMatrix::from_vec(n, n, a), DMatrix::from_vec(n, n, l)))
+        let scale = 1.0 / (n as f64).sqrt();
+        let matrix = move |values| DMatrix::from_vec(n, n, values) * scale;
+        (entries(), entries()).prop_map(move |(a, l)| (matrix(a), matrix(l)))
     })
 }
 

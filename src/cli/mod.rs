@@ -8,6 +8,7 @@ mod aid_columns;
 pub mod allan;
 mod allan_figure;
 pub mod compare;
+pub mod export;
 mod flags;
 pub mod identify;
 pub mod inflate;
@@ -60,6 +61,7 @@ enum Command {
     Replay(replay::Args),
     Montecarlo(montecarlo::Args),
     Merge(montecarlo::MergeArgs),
+    Export(export::Args),
     Schema(schema::Args),
 }
 
@@ -88,6 +90,7 @@ pub fn main() -> ExitCode {
         Command::Replay(args) => replay::run(&args),
         Command::Montecarlo(args) => montecarlo::run(&args),
         Command::Merge(args) => montecarlo::merge(&args),
+        Command::Export(args) => export::run(&args),
         Command::Schema(args) => schema::run(&args),
     };
     match result {

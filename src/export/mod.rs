@@ -1,5 +1,6 @@
-//! Getting results out (floor 6): tables as csv, csv.gz and npy, test reports, written atomically.
+//! Getting results out (floor 6): tables as csv, csv.gz and npy, test reports, parameter files for other programs, written atomically.
 
 pub mod atomic;
+pub mod consumer;
 pub mod junit;
 pub mod table;

@@ -15,6 +15,7 @@ mod plant;
 mod prediction;
 mod sensor;
 mod under_truth;
+mod walk_price;
 
 use nalgebra::DMatrix;
 use schemars::JsonSchema;
@@ -34,6 +35,7 @@ pub use flicker::FlickerApproximation;
 pub use insight::{FACTORS, Insight, MISTAKES, Mistake, Observed, OutputInsight, WHOLE_SENSOR, Worth, insight};
 pub use prediction::{Predicted, predicted_sigma};
 pub use under_truth::{ErrorOverTime, Tendency, UnderTruth, under_truth};
+pub use walk_price::{WalkPrice, walk_price};
 
 /// Choices of [`tune`].
 #[derive(Clone, Debug, PartialEq)]

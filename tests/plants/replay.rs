@@ -266,9 +266,13 @@ fn a_log_without_what_the_filter_measures_is_refused() {
     refused("--aid heading=yaw:deg --aid heading=yaw:deg", &["'heading' is given twice"]);
     let out = bench.run("tune params.json --log log.csv");
     assert!(out.status == 2 && out.stderr.contains("replay --aid NAME=COLUMN"), "{out:?}");
-    // a custom plant with more than the sensor
+    // a custom plant with an input of its own, and one whose design was taken out by hand
     let design = std::fs::read_to_string(crate::support::data("design/pendulum.json")).unwrap();
     bench.file("pendulum.json", design);
     bench.ok("tune params.json --plant pendulum.json -o filter.json");
-    refused("--aid encoder=yaw:deg", &["custom plant", "montecarlo judges this one"]);
+    refused("--aid encoder=yaw:deg", &["the filter needs torque", "--aid torque=COLUMN"]);
+    let mut document: Value = serde_json::from_str(&bench.read("filter.json")).unwrap();
+    document.as_object_mut().unwrap().remove("design");
+    bench.file("filter.json", document.to_string());
+    refused("--aid encoder=yaw:deg", &["custom plant", "'design' section"]);
 }

@@ -1,0 +1,175 @@
+//! `kfdesign export`.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, anyhow, bail};
+
+use super::Status;
+use super::flags::with_unit;
+use super::output::{digits, print_text};
+use crate::export::atomic;
+use crate::export::consumer::{Choice, Export, Sensor, Target, Walk, write};
+use crate::params::Params;
+use crate::tune::walk_price;
+use crate::units::{Dimension, Quantity};
+
+/// Noise parameters in the files and units of other programs
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example: kfdesign export params.json --to kalibr --accelerometer accelerometer.json --inflate 10 -o imu.yaml"
+)]
+pub struct Args {
+    /// Noise parameters of a gyro or an accelerometer
+    params: PathBuf,
+    /// Whose file it is
+    #[arg(long, value_enum, value_name = "TARGET")]
+    to: TargetFlag,
+    /// The file [default: stdout]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Noise parameters of the other sensor of the unit
+    #[arg(long, value_name = "PARAMS")]
+    accelerometer: Option<PathBuf>,
+    /// Rate of the log that the program will read, or of its filter's steps, in Hz [default: that of the parameters; px4: 100, ardupilot: 83.3]
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
+    /// Multiply every white density and every drift; written beside the identified numbers
+    #[arg(long, value_name = "FACTOR")]
+    inflate: Option<f64>,
+    /// Where the file has one number for three axes: worst, mean (root mean square) or the name of an axis
+    #[arg(long, value_name = "AXIS", default_value = "worst")]
+    axis: String,
+    /// Where the file knows no other drift than a random walk: short (the growth over short times) or horizon=60s (the growth over that time)
+    #[arg(long, value_name = "RULE", default_value = "short")]
+    walk: String,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum TargetFlag {
+    Kalibr,
+    Openvins,
+    Vins,
+    Orbslam3,
+    Gtsam,
+    Px4,
+    Ardupilot,
+    Matlab,
+    GnssInsSim,
+    Navego,
+    Gazebo,
+}
+
+impl TargetFlag {
+    fn target(self) -> Target {
+        match self {
+            TargetFlag::Kalibr => Target::Kalibr,
+            TargetFlag::Openvins => Target::OpenVins,
+            TargetFlag::Vins => Target::Vins,
+            TargetFlag::Orbslam3 => Target::OrbSlam3,
+            TargetFlag::Gtsam => Target::Gtsam,
+            TargetFlag::Px4 => Target::Px4,
+            TargetFlag::Ardupilot => Target::ArduPilot,
+            TargetFlag::Matlab => Target::Matlab,
+            TargetFlag::GnssInsSim => Target::GnssInsSim,
+            TargetFlag::Navego => Target::NaveGo,
+            TargetFlag::Gazebo => Target::Gazebo,
+        }
+    }
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
+    for (name, value) in [("--rate", args.rate), ("--inflate", args.inflate)] {
+        if let Some(value) = value.filter(|v| !(*v > 0.0 && v.is_finite())) {
+            bail!("{name} {value}: expected a number above zero");
+        }
+    }
+    let walk = walk(&args.walk)?;
+    let mut export = Export {
+        gyro: None,
+        accelerometer: None,
+        rate_hz: args.rate,
+        sample_rate_hz: 0.0,
+        inflation: args.inflate.unwrap_or(1.0),
+        choice: match args.axis.as_str() {
+            "worst" => Choice::Worst,
+            "mean" => Choice::Mean,
+            name => Choice::Axis(name.to_owned()),
+        },
+        walk,
+        origin: vec![format!("kfdesign {} export", env!("CARGO_PKG_VERSION"))],
+        price: Vec::new(),
+    };
+    for (path, given) in [(Some(&args.params), ""), (args.accelerometer.as_ref(), "--accelerometer ")] {
+        let Some(path) = path else { continue };
+        if let Some(output) = &args.output {
+            atomic::refuse_input_as_output(output, path)?;
+        }
+        let params = Params::read(path)?;
+        if !given.is_empty() && params.quantity != Quantity::SpecificForce {
+            bail!(
+                "{given}{}: the parameters are of an {}, expected a specific force",
+                path.display(),
+                params.quantity.name()
+            );
+        }
+        add(&mut export, path, &params)?;
+    }
+    let written = write(args.to.target(), &export).map_err(|message| anyhow!(message))?;
+    for warning in &written.warnings {
+        eprintln!("  warning: {warning}");
+    }
+    match &args.output {
+        Some(path) => {
+            atomic::write(path, written.text.as_bytes())?;
+            print_text(&format!("{} written\n", path.display()))?;
+        }
+        None => print_text(&written.text)?,
+    }
+    Ok(Status::Done)
+}
+
+/// One sensor of the unit with what is said of its origin.
+fn add(export: &mut Export, path: &Path, params: &Params) -> anyhow::Result<()> {
+    let shown = path.display().to_string();
+    let sensor = Sensor::new(params, export.walk).map_err(|message| anyhow!(message)).with_context(|| shown.clone())?;
+    let source = params.source.clone().unwrap_or_default();
+    let log = source.log.map_or_else(String::new, |log| format!(", from {log}"));
+    let hash = source.sha256.map_or_else(String::new, |hash| format!(" (sha256 {hash})"));
+    let method = source.method.map_or_else(String::new, |method| format!(", {method}"));
+    export.origin.push(format!("{shown}{log}{hash}{method}"));
+    for (axis, numbers) in params.axes.iter().zip(&sensor.axes).filter(|(_, n)| !n.processes.is_empty()) {
+        let price = walk_price(axis, params.quantity, 1.0 / params.sample_rate_hz, numbers.walk.value);
+        if let Some(price) = price {
+            export.price.push(format!(
+                "{}: at rest a filter with this walk has {} times the error of one with the true drift, NEES {}",
+                axis.name,
+                digits(price.error),
+                digits(price.nees)
+            ));
+        }
+    }
+    export.sample_rate_hz = if export.sample_rate_hz > 0.0 { export.sample_rate_hz } else { params.sample_rate_hz };
+    let slot = match params.quantity {
+        Quantity::AngularRate => &mut export.gyro,
+        Quantity::SpecificForce => &mut export.accelerometer,
+    };
+    if slot.is_some() {
+        bail!("{shown}: both files are of a {}", params.quantity.name());
+    }
+    *slot = Some(sensor);
+    Ok(())
+}
+
+fn walk(text: &str) -> anyhow::Result<Walk> {
+    match text.split_once('=') {
+        None if text == "short" => Ok(Walk::Short),
+        Some(("horizon", time)) => {
+            let seconds = with_unit("--walk horizon", time, Dimension::TIME, "60s")?;
+            if seconds > 0.0 {
+                return Ok(Walk::Horizon(seconds));
+            }
+            bail!("--walk {text}: expected a time above zero")
+        }
+        _ => bail!("--walk {text}: expected short or horizon=TIME, for example horizon=60s"),
+    }
+}

@@ -2,7 +2,7 @@
 
 use kfdesign::identify::{Method, identify_axis, parse_model};
 use kfdesign::numerics::random::{StreamId, normal, stream};
-use kfdesign::params::{AxisParams, TermEntry};
+use kfdesign::params::AxisParams;
 use kfdesign::units::Unit;
 
 use super::support::Bench;

@@ -23,7 +23,7 @@ pub enum Form {
 /// A filter in progress.
 #[derive(Clone, Debug)]
 pub enum Running {
-    Joseph(Kalman),
+    Joseph(Box<Kalman>),
     /// With a filter that bridges long gaps.
     SquareRoot(Box<(SquareRoot, Kalman)>),
     ConstantGain(Box<ConstantGain>),
@@ -34,7 +34,7 @@ impl Running {
     pub fn new(form: Form, design: &AxisDesign) -> Result<Running, LinalgError> {
         let model = &design.model;
         Ok(match form {
-            Form::Joseph => Running::Joseph(Kalman::new(model)),
+            Form::Joseph => Running::Joseph(Box::new(Kalman::new(model))),
             Form::SquareRoot => Running::SquareRoot(Box::new((SquareRoot::new(model)?, Kalman::new(model)))),
             Form::ConstantGain => Running::ConstantGain(Box::new(ConstantGain::new(model, &design.steady_state))),
         })

@@ -124,7 +124,7 @@ impl Watched {
         if self.lost_at.is_some() {
             return;
         }
-        if (0..x.len()).any(|i| !(variance(i) >= 0.0) || !x[i].is_finite()) {
+        if (0..x.len()).any(|i| variance(i).is_nan() || variance(i) < 0.0 || !x[i].is_finite()) {
             self.lost_at = Some(step);
         } else if count {
             self.counted += 1;

@@ -6,6 +6,7 @@
 
 mod allan;
 mod architecture;
+mod attitude;
 mod bad_input;
 mod cli;
 mod compare;

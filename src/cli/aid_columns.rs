@@ -45,12 +45,16 @@ pub(super) fn aid_columns(flags: &[String], design: &FilterDesign) -> anyhow::Re
         };
         let text = given[at].1[taken[at]];
         taken[at] += 1;
-        // a unit behind the last colon, unless the name itself has it
-        let unit = text.rsplit_once(':').and_then(|(column, unit)| Some((column, Unit::parse(unit).ok()?)));
-        let (column, unit) = unit.map_or((text, None), |(column, unit)| (column, Some(unit)));
+        let (column, unit) = column_and_unit(text);
         let dimension = Unit::parse(&measurement.unit).with_context(|| measurement.name.clone())?.dimension();
         let flag = format!("--aid {}={column}", measurement.name);
         extra.push(ExtraColumn { column: column.to_string(), unit, dimension, flag });
     }
     Ok(extra)
+}
+
+/// `COLUMN` or `COLUMN:UNIT`: a unit behind the last colon, unless the name itself has it.
+pub(super) fn column_and_unit(text: &str) -> (&str, Option<Unit>) {
+    let unit = text.rsplit_once(':').and_then(|(column, unit)| Some((column, Unit::parse(unit).ok()?)));
+    unit.map_or((text, None), |(column, unit)| (column, Some(unit)))
 }

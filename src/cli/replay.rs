@@ -1,5 +1,6 @@
 //! `kfdesign replay`.
 
+mod attitude;
 mod sight;
 
 use std::io::Write;
@@ -15,7 +16,7 @@ use super::tests_table::{TESTS, caption, rows};
 use crate::consistency::Verdict;
 use crate::export::atomic::{AtomicFile, refuse_input_as_output};
 use crate::export::table::TableWriter;
-use crate::filter::{FilterDesign, Form};
+use crate::filter::{AttitudeDesign, FilterDesign, Form};
 use crate::input::{Block, LogOptions, LogReader};
 use crate::replay::{AxisResult, Estimates, LogShape, Options, ReplayResult, Replayer};
 use crate::units::{Quantity, Unit};
@@ -27,7 +28,7 @@ use crate::units::{Quantity, Unit};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: kfdesign replay filter.json log.csv -o estimates.csv --innovations")]
 pub struct Args {
-    /// The design, as written by `tune`
+    /// The design, as written by `tune`: filter.json or attitude.json
     filter: PathBuf,
     /// The log: text, .gz or .npy
     log: PathBuf,
@@ -67,6 +68,8 @@ pub struct Args {
     #[arg(long, value_name = "NAME=COLUMN")]
     aid: Vec<String>,
     #[command(flatten)]
+    attitude: attitude::Flags,
+    #[command(flatten)]
     reading: LogFlags,
 }
 
@@ -92,6 +95,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         },
     };
     options.check()?;
+    if AttitudeDesign::is(&args.filter) {
+        return attitude::run(args);
+    }
+    args.attitude.refuse()?;
     let design = FilterDesign::read(&args.filter)?;
     for output in [&args.output, &args.report, &args.plot].into_iter().flatten() {
         refuse_input_as_output(output, &args.log)?;

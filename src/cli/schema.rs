@@ -5,10 +5,11 @@ use clap::ValueEnum;
 use super::{Status, output};
 use crate::compare::Comparison;
 use crate::compare::inflation::Inflation;
-use crate::filter::FilterDesign;
+use crate::filter::{AttitudeDesign, FilterDesign};
 use crate::montecarlo;
 use crate::params::Params;
 use crate::replay::ReplayResult;
+use crate::replay::attitude::AttitudeReplay;
 
 /// The JSON schema of a document
 #[derive(Debug, clap::Args)]
@@ -25,8 +26,12 @@ enum Document {
     Params,
     /// filter.json: a filter design
     Filter,
+    /// attitude.json: the filter of the plant attitude
+    Attitude,
     /// What `replay --json` prints
     Replay,
+    /// What `replay --json` prints of an attitude filter
+    AttitudeReplay,
     /// What `compare --json` prints
     Compare,
     /// What `inflate --json` prints
@@ -39,6 +44,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     output::print_json(&match args.document {
         Document::Params => Params::schema(),
         Document::Filter => FilterDesign::schema(),
+        Document::Attitude => AttitudeDesign::schema(),
+        Document::AttitudeReplay => schemars::schema_for!(AttitudeReplay).to_value(),
         Document::Montecarlo => montecarlo::document::schema(),
         Document::Compare => schemars::schema_for!(Comparison).to_value(),
         Document::Inflate => schemars::schema_for!(Inflation).to_value(),

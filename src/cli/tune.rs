@@ -1,5 +1,6 @@
 //! `kfdesign tune`.
 
+mod attitude;
 mod compare;
 mod insight;
 mod logs;
@@ -24,7 +25,7 @@ use super::output::{print_json, print_text, progress};
 use crate::consistency::Verdict;
 use crate::export::atomic;
 use crate::montecarlo::{Outcome, Plan, verify};
-use crate::params::Params;
+use crate::params::{Params, PlantEntry};
 use crate::replay::ReplayResult;
 use crate::tune::objective::{Objective, Record, Request, tune_by};
 use crate::tune::{AxisReport, Insight, TuneOptions, Tuned, UnderTruth, insight, tune, under_truth};
@@ -108,7 +109,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     }
     let params = Params::read(params_path)?;
     let name = params_path.display().to_string();
-    let options = TuneOptions { design: args.plant.design(&params)?, flicker_horizon_s: args.flicker_horizon };
+    let design = args.plant.design(&params)?;
+    let attitude = design.as_ref().or(params.design.as_ref()).filter(|d| matches!(d.plant, PlantEntry::Attitude(_)));
+    if let Some(design) = attitude {
+        return attitude::run(args, &name, &params, design);
+    }
+    let options = TuneOptions { design, flicker_horizon_s: args.flicker_horizon };
     let (mut tuned, record) = chosen(args, &params, &options, &reading).with_context(|| name.clone())?;
     let truth = args.truth.as_deref().map(|path| Truth::read(path, &tuned, &options)).transpose()?;
     let plan = Plan { runs: args.runs, seed: args.seed, ..Plan::quick(params.sample_rate_hz) };

@@ -60,6 +60,10 @@ impl FilterDesign {
             column: e.column,
             message: e.message,
         })?;
+        if value.get("format").is_some_and(|format| format == super::attitude::FORMAT) {
+            let message = "this is an attitude filter, which is nonlinear: only replay takes it".into();
+            return Err(FilterError::Invalid { path: path.into(), key: "format".into(), message });
+        }
         reading::design(&place::Place::root(&value)).map_err(|e| FilterError::Invalid {
             path: path.into(),
             key: e.key,

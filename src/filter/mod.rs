@@ -15,6 +15,7 @@ macro_rules! for_size {
     };
 }
 
+pub mod attitude;
 pub mod constant_gain;
 pub mod cycle;
 pub mod document;
@@ -33,6 +34,7 @@ pub mod square_root;
 pub mod steady_state;
 mod transition;
 
+pub use attitude::{AttitudeDesign, AttitudeModel};
 pub use constant_gain::ConstantGain;
 pub use cycle::Cycle;
 pub use document::{AxisDesign, FilterDesign, FilterError};

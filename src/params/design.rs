@@ -14,7 +14,7 @@ use super::{AxisParams, Measured, ParamsError};
 use crate::units::{Dimension, Quantity, Unit, digits};
 
 /// Names of the plants, in documents and flags.
-pub const PLANTS: [&str; 5] = ["static", "angle", "rate", "vertical", "custom"];
+pub const PLANTS: [&str; 6] = ["static", "angle", "rate", "vertical", "attitude", "custom"];
 
 const ANGLE: Dimension = Dimension::new(2, 0, 0);
 const RATE: Dimension = Quantity::AngularRate.dimension();
@@ -49,7 +49,19 @@ pub enum PlantEntry {
         gravity: Option<Measured>,
         initial_std_dev: Option<Measured>,
     },
+    /// Three axes: the gyro is integrated to a quaternion, gravity and a heading aid it.
+    Attitude(Box<AttitudeEntry>),
     Custom(Box<CustomEntry>),
+}
+
+/// What the plant attitude is given.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AttitudeEntry {
+    /// Noise of an axis of the accelerometer; it holds for all three.
+    pub accelerometer: AxisParams,
+    pub gravity: Option<Measured>,
+    /// Spread of scale factors and misalignments of the gyro.
+    pub scale_factor: Option<Measured>,
 }
 
 /// How the true rate moves.
@@ -127,7 +139,8 @@ impl PlantEntry {
             PlantEntry::Angle { .. } => 1,
             PlantEntry::Rate { .. } => 2,
             PlantEntry::Vertical { .. } => 3,
-            PlantEntry::Custom(_) => 4,
+            PlantEntry::Attitude(_) => 4,
+            PlantEntry::Custom(_) => 5,
         };
         PLANTS[number]
     }
@@ -136,7 +149,7 @@ impl PlantEntry {
     pub fn aided(&self, measures: Option<&str>) -> Option<Dimension> {
         match self {
             PlantEntry::Static => None,
-            PlantEntry::Angle { .. } | PlantEntry::Vertical { .. } => Some(ANGLE),
+            PlantEntry::Angle { .. } | PlantEntry::Vertical { .. } | PlantEntry::Attitude(_) => Some(ANGLE),
             PlantEntry::Rate { .. } => Some(RATE),
             PlantEntry::Custom(custom) => {
                 let named = |o: &&NamedEntry| measures.map_or(o.name != custom.sensor, |name| o.name == name);
@@ -190,8 +203,16 @@ pub fn unknown_plant(found: &str) -> String {
 impl Design {
     /// Reads a section that stands in another document.
     pub fn from_place(place: &Place<'_>) -> Result<Design, KeyError> {
-        let object =
-            place.object(&["plant", "motion", "accelerometer", "gravity", "initial_std_dev", "custom", "aids"])?;
+        let object = place.object(&[
+            "plant",
+            "motion",
+            "accelerometer",
+            "gravity",
+            "scale_factor",
+            "initial_std_dev",
+            "custom",
+            "aids",
+        ])?;
         let plant_place = object.required("plant")?;
         let name = plant_place.text()?;
         let plant = plant(&object, name).ok_or_else(|| plant_place.error(unknown_plant(name)))??;
@@ -200,9 +221,10 @@ impl Design {
             PlantEntry::Angle { .. } => &["initial_std_dev"],
             PlantEntry::Rate { .. } => &["motion", "initial_std_dev"],
             PlantEntry::Vertical { .. } => &["accelerometer", "gravity", "initial_std_dev"],
+            PlantEntry::Attitude(_) => &["accelerometer", "gravity", "scale_factor"],
             PlantEntry::Custom(_) => &["custom"],
         };
-        for key in ["motion", "accelerometer", "gravity", "initial_std_dev", "custom"] {
+        for key in ["motion", "accelerometer", "gravity", "scale_factor", "initial_std_dev", "custom"] {
             if let Some(foreign) = object.optional(key).filter(|_| !belongs.contains(&key)) {
                 return Err(foreign.error(format!("is no matter of the plant '{name}'")));
             }
@@ -272,6 +294,7 @@ fn plant(object: &Object<'_>, name: &str) -> Option<Result<PlantEntry, KeyError>
             .and_then(|place| motion(&place))
             .and_then(|motion| Ok(PlantEntry::Rate { motion, initial_std_dev: initial(RATE)? })),
         "vertical" => vertical(object),
+        "attitude" => attitude(object),
         "custom" => object.required("custom").and_then(|place| custom(&place)).map(|c| PlantEntry::Custom(Box::new(c))),
         _ => return None,
     })
@@ -283,6 +306,14 @@ fn vertical(object: &Object<'_>) -> Result<PlantEntry, KeyError> {
         gravity: measured(object, "gravity", Quantity::SpecificForce.dimension())?,
         initial_std_dev: measured(object, "initial_std_dev", ANGLE)?,
     })
+}
+
+fn attitude(object: &Object<'_>) -> Result<PlantEntry, KeyError> {
+    Ok(PlantEntry::Attitude(Box::new(AttitudeEntry {
+        accelerometer: axis(&object.required("accelerometer")?, Quantity::SpecificForce)?,
+        gravity: measured(object, "gravity", Quantity::SpecificForce.dimension())?,
+        scale_factor: measured(object, "scale_factor", Dimension::NONE)?,
+    })))
 }
 
 fn measured(object: &Object<'_>, key: &str, dimension: Dimension) -> Result<Option<Measured>, KeyError> {

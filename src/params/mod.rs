@@ -15,8 +15,8 @@ use crate::noise::{NoiseModel, Term};
 use crate::units::{Quantity, Unit, UnitError};
 
 pub use design::{
-    AidDrift, AidEntry, CustomEntry, Design, MotionEntry, NamedEntry, PLANTS, PlantEntry, StateEntry, check_name,
-    unknown_plant,
+    AidDrift, AidEntry, AttitudeEntry, CustomEntry, Design, MotionEntry, NamedEntry, PLANTS, PlantEntry, StateEntry,
+    check_name, unknown_plant,
 };
 pub(crate) use document::quantity;
 pub use measured::Measured;

@@ -2,6 +2,7 @@
 
 use super::{LogShape, ReplayError};
 use crate::filter::FilterDesign;
+use crate::units::Quantity;
 
 /// Sample rates may differ by this much, relatively: stamps of a good log are not better, and the filter does not notice.
 pub const RATE_TOLERANCE: f64 = 0.005;
@@ -12,20 +13,30 @@ pub const RATE_TOLERANCE: f64 = 0.005;
 /// their last letter x, y, z (`gyro_x`, `wx`, `x`); else, when both have the same number of axes and no name tells otherwise, by order.
 /// Log axes that the design does not have are left out.
 pub fn assign(design: &FilterDesign, log: &LogShape) -> Result<Vec<usize>, ReplayError> {
-    if log.quantity != design.quantity {
-        return Err(ReplayError::Quantity { log: log.quantity.si_unit(), filter: design.quantity.si_unit() });
+    let wanted: Vec<&str> = design.axes.iter().map(|a| a.name.as_str()).collect();
+    assign_to(&wanted, design.quantity, design.sample_rate_hz, log)
+}
+
+/// The same for axes, a quantity and a sample rate of any filter.
+pub fn assign_to(
+    wanted: &[&str],
+    quantity: Quantity,
+    sample_rate_hz: f64,
+    log: &LogShape,
+) -> Result<Vec<usize>, ReplayError> {
+    if log.quantity != quantity {
+        return Err(ReplayError::Quantity { log: log.quantity.si_unit(), filter: quantity.si_unit() });
     }
-    let difference = (log.sample_rate_hz / design.sample_rate_hz - 1.0).abs();
+    let difference = (log.sample_rate_hz / sample_rate_hz - 1.0).abs();
     if difference.is_nan() || difference > RATE_TOLERANCE {
         return Err(ReplayError::Rate {
             log_hz: log.sample_rate_hz,
-            filter_hz: design.sample_rate_hz,
+            filter_hz: sample_rate_hz,
             percent: 100.0 * difference,
         });
     }
-    let wanted: Vec<&str> = design.axes.iter().map(|a| a.name.as_str()).collect();
     let found: Vec<&str> = log.axes.iter().map(String::as_str).collect();
-    partners(&wanted, &found).ok_or_else(|| ReplayError::Axes { log: found.join(", "), filter: wanted.join(", ") })
+    partners(wanted, &found).ok_or_else(|| ReplayError::Axes { log: found.join(", "), filter: wanted.join(", ") })
 }
 
 /// For each wanted axis the index of its partner among those found; the rule of [`assign`]. None when it cannot be told.

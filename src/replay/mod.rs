@@ -7,6 +7,7 @@
 //! one, is counted and does not change the state. The statistics use the normalised innovations of accepted samples; see
 //! [`verdict`] for what is tested and [`crate::consistency::effect::judge`] for how the verdict on a measured log is reached.
 
+pub mod attitude;
 pub mod axes;
 mod axis;
 pub mod trace;

@@ -6,6 +6,7 @@
 //! `objective` chooses the physical `parameters`, `insight` says what other parts would buy, `under_truth` says what the design does when the
 //! sensor is another.
 
+mod attitude;
 mod closed_loop;
 mod flicker;
 mod insight;
@@ -30,6 +31,7 @@ use crate::numerics::linalg::LinalgError;
 use crate::params::{AxisParams, Design, Params};
 use crate::units::Quantity;
 
+pub use attitude::{AtRest, TunedAttitude, tune_attitude};
 pub use closed_loop::{Share, bandwidth_hz, error_budget};
 pub use flicker::FlickerApproximation;
 pub use insight::{FACTORS, Insight, MISTAKES, Mistake, Observed, OutputInsight, WHOLE_SENSOR, Worth, insight};
@@ -69,6 +71,8 @@ pub enum TuneError {
     Linalg { axis: String, source: LinalgError },
     #[error("axis '{axis}': nothing measures the {output}; give an aid, for example --aid \"2 deg @ 1 Hz\"")]
     NoAid { axis: String, output: String },
+    #[error("{source}")]
+    Attitude { source: ModelError },
     #[error("the truth has the axes {truth}, the design {design}; expected the same names")]
     TruthAxes { truth: String, design: String },
     #[error("the truth is in {truth}, the design in {design}")]

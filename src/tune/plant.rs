@@ -103,8 +103,15 @@ fn plant_of(design: &Design, quantity: Quantity, dt: f64) -> Result<Plant, Model
             initial_std_dev.as_ref().map_or(ANY_TILT, |m| m.si()),
             dt,
         ),
+        PlantEntry::Attitude(_) => Err(not_linear()),
         PlantEntry::Custom(entry) => custom::plant(&matrices(entry), dt),
     }
+}
+
+/// The attitude has a filter of its own.
+fn not_linear() -> ModelError {
+    let message = "'attitude' is not linear; its filter is made by `tune --plant attitude` and run by `replay` alone";
+    ModelError::Part { part: "plant".into(), message: message.into() }
 }
 
 fn matrices(entry: &CustomEntry) -> custom::Matrices {
@@ -161,6 +168,7 @@ fn aid_part(aid: &AidEntry, entry: &PlantEntry, plant: &Plant, warnings: &mut Ve
             plant.outputs.iter().position(named).ok_or_else(|| wrong("measures no output of the plant".into()))?
         }
         PlantEntry::Static => return Err(wrong("the plant 'static' has nothing to aid; choose a plant".into())),
+        PlantEntry::Attitude(_) => return Err(not_linear()),
         PlantEntry::Angle { .. } | PlantEntry::Rate { .. } => 0,
     };
     let sample_rate_hz = 1.0 / plant.dt;

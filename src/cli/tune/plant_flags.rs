@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow, bail};
 
 use crate::params::{
-    AidDrift, AidEntry, AxisParams, Design, Measured, MotionEntry, Params, PlantEntry, check_name, unknown_plant,
+    AidDrift, AidEntry, AttitudeEntry, AxisParams, Design, Measured, MotionEntry, Params, PlantEntry, check_name,
+    unknown_plant,
 };
 use crate::units::{Dimension, Quantity};
 
@@ -13,7 +14,7 @@ use crate::units::{Dimension, Quantity};
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Plant")]
 pub(in crate::cli) struct PlantFlags {
-    /// What the sensor is part of: static, angle, rate, vertical, or a design FILE.json [default: the design of the parameters, else static]
+    /// What the sensor is part of: static, angle, rate, vertical, attitude, or a design FILE.json [default: the design of the parameters, else static]
     #[arg(long, value_name = "PLANT")]
     pub(super) plant: Option<String>,
     /// A measurement of the plant: "[NAME:] SIGMA [@ RATE] [, SIGMA over TIME]", for example "heading: 2 deg @ 1 Hz, 1 deg over 60 s"; or
@@ -23,7 +24,7 @@ pub(in crate::cli) struct PlantFlags {
     /// Plant rate: "SIGMA over TIME" for a Gauss-Markov rate, or the density of an integrated random walk, such as "5 deg/s^2/sqrt(s)"
     #[arg(long, value_name = "MOTION")]
     pub(super) motion: Option<String>,
-    /// Plant vertical: noise parameters of the accelerometer, FILE or FILE:AXIS
+    /// Plants vertical and attitude: noise parameters of the accelerometer, FILE or FILE:AXIS; of several axes attitude takes the noisiest
     #[arg(long, value_name = "PARAMS")]
     pub(super) accelerometer: Option<String>,
 }
@@ -76,8 +77,14 @@ impl PlantFlags {
             Some("vertical") => {
                 let path = self.accelerometer.as_deref();
                 let path = path.context("--plant vertical: give the accelerometer's noise, --accelerometer PARAMS")?;
-                let accelerometer = Box::new(accelerometer(path)?);
+                let accelerometer = Box::new(accelerometer(path, Choice::Named)?);
                 PlantEntry::Vertical { accelerometer, gravity: None, initial_std_dev: None }
+            }
+            Some("attitude") => {
+                let path = self.accelerometer.as_deref();
+                let path = path.context("--plant attitude: give the accelerometer's noise, --accelerometer PARAMS")?;
+                let accelerometer = accelerometer(path, Choice::Noisiest)?;
+                PlantEntry::Attitude(Box::new(AttitudeEntry { accelerometer, gravity: None, scale_factor: None }))
             }
             Some("custom") => bail!(
                 "--plant custom: a custom plant needs its matrices; give them in a design file, --plant FILE.json"
@@ -96,16 +103,30 @@ impl PlantFlags {
             (None, _) => {}
         }
         match (&self.accelerometer, plant) {
-            (Some(path), PlantEntry::Vertical { accelerometer: known, .. }) => **known = accelerometer(path)?,
-            (Some(_), _) => bail!("--accelerometer is no matter of the plant '{name}'; it belongs to --plant vertical"),
+            (Some(path), PlantEntry::Vertical { accelerometer: known, .. }) => {
+                **known = accelerometer(path, Choice::Named)?;
+            }
+            (Some(path), PlantEntry::Attitude(entry)) => entry.accelerometer = accelerometer(path, Choice::Noisiest)?,
+            (Some(_), _) => {
+                bail!("--accelerometer is no matter of the plant '{name}'; it belongs to --plant vertical and attitude")
+            }
             (None, _) => {}
         }
         Ok(())
     }
 }
 
-/// `FILE` with one axis, or `FILE:AXIS`.
-fn accelerometer(text: &str) -> anyhow::Result<AxisParams> {
+/// Which axis of several, where the flag names none.
+#[derive(Clone, Copy, PartialEq)]
+enum Choice {
+    /// None: it must be named.
+    Named,
+    /// The one with the most white noise.
+    Noisiest,
+}
+
+/// `FILE`, or `FILE:AXIS`.
+fn accelerometer(text: &str, choice: Choice) -> anyhow::Result<AxisParams> {
     let (path, axis) = match text.rsplit_once(':') {
         Some((path, axis)) if !Path::new(text).exists() => (path, Some(axis)),
         _ => (text, None),
@@ -115,8 +136,11 @@ fn accelerometer(text: &str) -> anyhow::Result<AxisParams> {
         bail!("--accelerometer {path}: is of an {}, expected a specific-force", params.quantity.name());
     }
     let names: Vec<&str> = params.axes.iter().map(|axis| axis.name.as_str()).collect();
+    let white = |axis: &&AxisParams| axis.noise().white_density();
+    let noisiest = params.axes.iter().max_by(|a, b| white(a).total_cmp(&white(b)));
     let wanted = match (axis, names.as_slice()) {
         (Some(axis), _) => axis,
+        (None, _) if choice == Choice::Noisiest => noisiest.map_or("", |axis| axis.name.as_str()),
         (None, [one]) => one,
         (None, [first, ..]) => bail!(
             "--accelerometer {path}: there are the axes {}; choose one, for example --accelerometer {path}:{first}",
@@ -156,7 +180,7 @@ fn aid(text: &str, design: &Design) -> anyhow::Result<AidEntry> {
     let dimension = plant.aided(None).with_context(|| format!("the plant '{}' has nothing to aid", plant.name()))?;
     let (name, rest) = match text.split_once(':') {
         Some((name, rest)) => (name.trim(), rest),
-        None if matches!(plant, PlantEntry::Angle { .. }) => ("heading", text),
+        None if matches!(plant, PlantEntry::Angle { .. } | PlantEntry::Attitude(_)) => ("heading", text),
         None => ("aid", text),
     };
     check_name(name).map_err(|message| anyhow!(message))?;

@@ -13,17 +13,20 @@ use crate::params::{AxisParams, Measured};
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "Design")]
 struct DesignDocument {
-    /// "static", "angle", "rate", "vertical" or "custom".
+    /// "static", "angle", "rate", "vertical", "attitude" or "custom".
     plant: String,
     /// Plant rate: how the true rate moves.
     #[serde(skip_serializing_if = "Option::is_none")]
     motion: Option<MotionDocument>,
-    /// Plant vertical: the noise of the accelerometer, with the keys of an axis.
+    /// Plants vertical and attitude: the noise of the accelerometer, with the keys of an axis.
     #[serde(skip_serializing_if = "Option::is_none")]
     accelerometer: Option<AxisParams>,
-    /// Plant vertical; standard gravity when absent.
+    /// Plants vertical and attitude; standard gravity when absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     gravity: Option<Measured>,
+    /// Plant attitude: spread of scale factors and misalignments of the gyro, for example "0.5 %"; that when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    scale_factor: Option<Measured>,
     /// Spread of the angle or rate before the first measurement.
     #[serde(skip_serializing_if = "Option::is_none")]
     initial_std_dev: Option<Measured>,
@@ -122,6 +125,7 @@ impl From<&Design> for DesignDocument {
             motion: None,
             accelerometer: None,
             gravity: None,
+            scale_factor: None,
             initial_std_dev: None,
             custom: None,
             aids: design.aids.iter().map(AidDocument::from).collect(),
@@ -142,6 +146,11 @@ impl From<&Design> for DesignDocument {
                 document.accelerometer = Some(*accelerometer);
                 document.gravity = gravity;
                 document.initial_std_dev = initial_std_dev;
+            }
+            PlantEntry::Attitude(entry) => {
+                document.accelerometer = Some(entry.accelerometer);
+                document.gravity = entry.gravity;
+                document.scale_factor = entry.scale_factor;
             }
             PlantEntry::Custom(custom) => document.custom = Some(CustomDocument::from(*custom)),
         }

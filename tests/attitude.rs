@@ -149,7 +149,7 @@ fn errors_have_the_claimed_covariance() {
                 + vector() * model.accelerometer.variance.sqrt();
             let late = truth * UnitQuaternion::from_scaled_axis(-rate * delay);
             let jitter = aid.jitter * rate.norm() * vector().x;
-            // a level field, turned by its errors: positive is towards west
+            // a level field, turned by its errors towards east
             let angle = disturbance + aid.std_dev * vector().x + jitter;
             let field = late.inverse() * Vector3::new(angle.sin(), angle.cos(), 0.0);
             mekf.step(&Row { rate: measured, force, heading: Some(Heading::Field(field)) }, 0);

@@ -2,6 +2,7 @@
 //!
 //! One table per kind of file; a row is what is wrong, the command, and words that the line must contain.
 
+mod attitude;
 mod temperature;
 
 use super::support::Bench;

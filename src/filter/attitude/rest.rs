@@ -43,10 +43,10 @@ impl Rest {
         if self.rows.is_empty() {
             self.origin = row;
         }
-        if self.rows.len() == self.length {
-            if let Some(old) = self.rows.pop_front() {
-                self.add(&old, -1.0);
-            }
+        if self.rows.len() == self.length
+            && let Some(old) = self.rows.pop_front()
+        {
+            self.add(&old, -1.0);
         }
         self.rows.push_back(row);
         self.add(&row, 1.0);

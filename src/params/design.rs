@@ -254,6 +254,10 @@ impl Design {
             PlantEntry::Vertical { accelerometer, .. } => {
                 accelerometer.noise_parameters().map(|(path, m)| (format!("accelerometer.{path}"), m)).collect()
             }
+            PlantEntry::Attitude(entry) => {
+                let accelerometer = entry.accelerometer.noise_parameters();
+                accelerometer.map(|(path, m)| (format!("accelerometer.{path}"), m)).collect()
+            }
             PlantEntry::Static | PlantEntry::Angle { .. } | PlantEntry::Custom(_) => Vec::new(),
         };
         plant.into_iter().chain(self.aids.iter_mut().flat_map(|aid| {

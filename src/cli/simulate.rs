@@ -333,7 +333,7 @@ impl PlantColumns {
             PlantEntry::Vertical { .. } => (Some("tilt"), "rad"),
             // its state is the true rate, which has a column
             PlantEntry::Rate { .. } => (Some("rate"), quantity.si_unit()),
-            PlantEntry::Static | PlantEntry::Custom(_) => (None, quantity.si_unit()),
+            PlantEntry::Static | PlantEntry::Attitude(_) | PlantEntry::Custom(_) => (None, quantity.si_unit()),
         };
         PlantColumns {
             state,

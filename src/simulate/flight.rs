@@ -49,7 +49,7 @@ struct AidGenerator {
 }
 
 impl Flight {
-    /// Starts at zero. `None` for a sensor at rest. Errors: a custom plant, an aid whose rate is no whole fraction of the sample rate, an
+    /// Starts at zero. `None` for a sensor at rest. Errors: a custom plant or an attitude, an aid whose rate is no whole fraction of the sample rate, an
     /// accelerometer's line too fast for it.
     pub fn new(design: &Design, axes: usize, scenario: &Scenario) -> Result<Option<Flight>, SimulateError> {
         let dt = 1.0 / scenario.rate_hz;
@@ -58,6 +58,11 @@ impl Flight {
             PlantEntry::Custom(_) => {
                 let message = "the design is a custom plant: simulate moves the plants angle, rate and vertical; leave the design out with \
                                --plant static, or judge the filter with montecarlo";
+                return Err(SimulateError(message.into()));
+            }
+            PlantEntry::Attitude(_) => {
+                let message = "the design is the plant attitude: simulate moves the plants angle, rate and vertical; leave the design out with \
+                               --plant static";
                 return Err(SimulateError(message.into()));
             }
             PlantEntry::Angle { .. } | PlantEntry::Rate { .. } => (None, None),

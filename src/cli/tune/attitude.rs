@@ -23,6 +23,7 @@ pub(super) fn run(args: &Args, name: &str, params: &Params, design: &Design) -> 
         ("--log", !args.log.is_empty()),
         ("--objective", args.choosing.objective != ObjectiveArg::Nominal),
         ("--hold", !args.choosing.hold.is_empty()),
+        ("--insight", args.insight),
         ("--report", args.report.is_some()),
         ("--plot", args.plot.is_some()),
     ];

@@ -131,10 +131,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     }
     let kept = record.iter().flat_map(|record| &record.robust).all(|axis| axis.met);
     let verified = verification.verdict == Verdict::Consistent && kept;
+    let replays = args.log.iter().map(|log| reading.replay(log, &tuned.design)).collect::<anyhow::Result<Vec<_>>>()?;
     if let (Some(output), true) = (&args.output, verified) {
         atomic::write(output, tuned.design.to_json().as_bytes())?;
     }
-    let replays = args.log.iter().map(|log| reading.replay(log, &tuned.design)).collect::<anyhow::Result<Vec<_>>>()?;
     let view = text::View {
         name: &name,
         params: &params,

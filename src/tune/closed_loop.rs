@@ -154,24 +154,9 @@ fn white_name(model: &LinearModel, measurement: usize) -> String {
     format!("{}.white", model.measurements[measurement].name)
 }
 
-/// The states `kept` alone.
-pub(super) fn alone(model: &LinearModel, kept: &[usize]) -> LinearModel {
-    LinearModel {
-        states: kept.iter().map(|&i| model.states[i].clone()).collect(),
-        outputs: Vec::new(),
-        f: part(&model.f, kept, kept),
-        g: model.g.select_rows(kept),
-        h: model.h.select_columns(kept),
-        q: part(&model.q, kept, kept),
-        x0: model.x0.select_rows(kept),
-        p0: part(&model.p0, kept, kept),
-        ..model.clone()
-    }
-}
-
 /// The states `kept` alone, settled, before the measurements of a sample at which all are taken.
 pub(super) fn settled(model: &LinearModel, kept: &[usize]) -> Result<LinearModel, LinalgError> {
-    let mut alone = alone(model, kept);
+    let mut alone = model.part(kept);
     let steady = steady_state(&alone).map_err(|error| match error {
         SteadyStateError::Linalg(source) | SteadyStateError::Riccati { source, .. } => source,
         _ => LinalgError::Singular,

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::closed_loop::{alone, driven, settled};
+use super::closed_loop::{driven, settled};
 use super::prediction::{Predicted, settled_after};
 use super::{TuneError, TuneOptions, Tuned, plant};
 use crate::filter::mismatch::expect_settled;
@@ -348,7 +348,7 @@ impl Made<'_> {
                 of_truth: output.row_in(&truth_rows)?.select_columns(&its),
                 of_estimate: output.row.select_columns(&kept),
             };
-            let truth = alone(&truth, &its);
+            let truth = truth.part(&its);
             let result = expect_settled(&filter, &truth, &judge, &Cycle::new(&filter.every)?).ok()?;
             ratios.push((result.error.covariance[(0, 0)] / result.error.claimed[(0, 0)]).sqrt());
             nis = result.nis;

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::closed_loop::{alone, driven, settled};
+use super::closed_loop::{driven, settled};
 use super::{TuneOptions, sensor_model};
 use crate::filter::mismatch::expect_settled;
 use crate::filter::{Cycle, Judge, Kalman};
@@ -41,7 +41,7 @@ pub fn walk_price(axis: &AxisParams, quantity: Quantity, dt: f64, k: f64) -> Opt
     let optimum: f64 = (&of_truth * &best.p * of_truth.transpose())[(0, 0)];
     let components = vec![Named { name: "drift".into(), unit: quantity.si_unit().into() }];
     let judge = Judge { components, of_truth, of_estimate };
-    let error = expect_settled(&filter, &alone(&truth, &in_truth), &judge, &Cycle::new(&filter.every)?).ok()?.error;
+    let error = expect_settled(&filter, &truth.part(&in_truth), &judge, &Cycle::new(&filter.every)?).ok()?.error;
     let real: &DMatrix<f64> = &error.covariance;
     Some(WalkPrice { error: (real[(0, 0)] / optimum).sqrt(), nees: real[(0, 0)] / error.claimed[(0, 0)] })
 }

@@ -264,8 +264,9 @@ fn a_log_without_what_the_filter_measures_is_refused() {
     refused("--aid heading=gyro_z", &["'gyro_z (deg/s)' is asked for twice"]);
     refused("--aid heading=nose:deg", &["no column 'nose'"]);
     refused("--aid heading=yaw:deg --aid heading=yaw:deg", &["'heading' is given twice"]);
-    let out = bench.run("tune params.json --log log.csv");
-    assert!(out.status == 2 && out.stderr.contains("replay --aid NAME=COLUMN"), "{out:?}");
+    let out = bench.run("tune params.json --log log.csv -o other.json");
+    assert!(out.status == 2 && out.stderr.contains("--aid heading=COLUMN"), "{out:?}");
+    assert!(!bench.path("other.json").exists());
     // a custom plant with an input of its own, and one whose design was taken out by hand
     let design = std::fs::read_to_string(crate::support::data("design/pendulum.json")).unwrap();
     bench.file("pendulum.json", design);

@@ -2,13 +2,14 @@
 
 use std::path::Path;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 
 use crate::cli::aid_columns::aid_columns;
 use crate::cli::log_flags::{LogFlags, print_check};
 use crate::cli::output::progress;
 use crate::filter::{FilterDesign, SensorLog};
 use crate::input::{Block, LogOptions, LogReader};
+use crate::model::LinearModel;
 use crate::replay::axes::assign;
 use crate::replay::{LogShape, Options, ReplayResult, Replayer};
 use crate::tune::objective::Log;
@@ -49,6 +50,12 @@ impl Reading<'_> {
     pub(super) fn read(&self, path: &Path, design: &FilterDesign) -> anyhow::Result<(Log, String)> {
         let Opened { name, mut reader, shape } = self.open(path, design)?;
         let assigned = assign(design, &shape).with_context(|| name.clone())?;
+        let beside = |model: &LinearModel| model.measurements.len() - usize::from(model.inputs.is_empty());
+        if design.axes.iter().map(|axis| beside(&axis.model)).sum::<usize>() != shape.aids {
+            bail!(
+                "{name}: the plant has an input of its own beside the sensor; parameters are chosen on logs only where the sensor is the one input"
+            );
+        }
         let mut axes = vec![SensorLog::default(); design.axes.len()];
         let mut block = Block::default();
         while reader.next_block(&mut block)? {
@@ -56,8 +63,7 @@ impl Reading<'_> {
             for ((log, axis), &column) in axes.iter_mut().zip(&design.axes).zip(&assigned) {
                 log.sensor.extend_from_slice(&block.values[column]);
                 log.missing.extend_from_slice(&block.missing);
-                let aids = axis.model.measurements.len() - usize::from(axis.model.inputs.is_empty());
-                log.aids.resize_with(aids, Vec::new);
+                log.aids.resize_with(beside(&axis.model), Vec::new);
                 log.aids.iter_mut().zip(&mut extra).for_each(|(aid, values)| aid.extend_from_slice(values));
             }
         }

@@ -91,13 +91,15 @@ pub enum ObjectiveError {
         "--objective robust: no interval of {names}; run identify first, which gives intervals, or hold what is known exactly (--hold NAME)"
     )]
     NoIntervals { names: String },
-    #[error("--objective robust: {axis}: nothing drifts, so that no claimed sigma is left to be honest")]
-    NothingDrifts { axis: String },
     #[error(
-        "--objective robust: {axis}: not even parameters {farthest} standard deviations away are honest for {percent} % of the sensors; the \
+        "--objective {objective}: {axis}: nothing drifts, so that no error is left after a long time that could be judged"
+    )]
+    NothingDrifts { objective: &'static str, axis: String },
+    #[error(
+        "--objective robust: {axis}: no parameters within the 99.7 % region of the identified ones are honest for {percent} % of the sensors; the \
          intervals are too wide to design on: record a longer log"
     )]
-    OutOfReach { axis: String, farthest: f64, percent: f64 },
+    OutOfReach { axis: String, percent: f64 },
     #[error("--objective nees needs the truth: --truth PARAMS")]
     NoTruth,
     #[error(
@@ -296,6 +298,10 @@ impl Problem<'_> {
     fn names(&self, group: &Group) -> String {
         let names: Vec<String> = group.axes.iter().map(|&axis| self.axis_name(axis)).collect();
         format!("axis {}", names.join(", "))
+    }
+
+    fn nothing_drifts(&self, group: &Group) -> ObjectiveError {
+        ObjectiveError::NothingDrifts { objective: self.request.objective.name(), axis: self.names(group) }
     }
 
     fn linalg(&self, group: &Group) -> impl Fn(LinalgError) -> ObjectiveError {

@@ -47,14 +47,10 @@ struct Expected {
     nis: f64,
 }
 
-fn expected(filter: &LinearModel, truth: &Truth) -> Result<Expected, LinalgError> {
-    let Some(settled) = Settled::new(filter)? else {
-        // nothing is uncertain in the end but the measurement itself
-        return Err(LinalgError::Singular);
-    };
-    let real = settled.under(truth)?;
-    let nees = real.sigma.iter().zip(&settled.claimed).map(|(real, claimed)| (real / claimed).powi(2)).collect();
-    Ok(Expected { outputs: settled.outputs().iter().map(|o| o.name.clone()).collect(), nees, nis: real.nis })
+fn expected(filter: &Settled, truth: &Truth) -> Result<Expected, LinalgError> {
+    let real = filter.under(truth)?;
+    let nees = real.sigma.iter().zip(&filter.claimed).map(|(real, claimed)| (real / claimed).powi(2)).collect();
+    Ok(Expected { outputs: filter.outputs().iter().map(|o| o.name.clone()).collect(), nees, nis: real.nis })
 }
 
 /// The truth has the same plant and aids; the numbers of the sensor alone move.
@@ -85,7 +81,11 @@ pub(super) fn choose(problem: &Problem<'_>, group: &Group, told: &mut Vec<NeesAx
     let unbounded = |_| ObjectiveError::Unbounded { axis: problem.names(group) };
     let at = |shifts: &DVector<f64>| -> Result<Vec<Expected>, ObjectiveError> {
         let models = problem.models(group, shifts.as_slice())?;
-        models.iter().zip(&truths).map(|(model, truth)| expected(model, truth).map_err(unbounded)).collect()
+        let of = |(model, truth): (&LinearModel, &Truth)| {
+            let filter = Settled::new(model).map_err(problem.linalg(group))?;
+            expected(&filter.ok_or_else(|| problem.nothing_drifts(group))?, truth).map_err(unbounded)
+        };
+        models.iter().zip(&truths).map(of).collect()
     };
     let residuals = |found: &[Expected]| {
         let of = |e: &Expected| e.nees.iter().copied().chain([e.nis]).map(f64::ln).collect::<Vec<_>>();

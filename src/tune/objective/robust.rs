@@ -3,7 +3,7 @@
 //! A sensor is drawn with ln θ normal, the intervals its middle 95 %; where they are those of a likelihood, with the correlation that such
 //! estimates have. A filter is honest for a sensor when no steady sigma that it claims, of the states of the plant and of the whole drift, is
 //! below that of its true error, by the exact covariance of the mismatched filter. The parameters are those of least mean ln(true sigma) among
-//! those that are honest for 95 % of the sensors and within three standard deviations (Mahalanobis) of what was identified.
+//! those that are honest for 95 % of the sensors and within the joint 99.7 % region of what was identified (an ellipsoid of χ²).
 
 use std::cell::RefCell;
 
@@ -17,6 +17,7 @@ use super::belief::Belief;
 use super::settled::{Settled, Truth};
 use super::{Found, ObjectiveError, Problem};
 use crate::model::LinearModel;
+use crate::numerics::distribution::chi_square_quantile;
 use crate::tune::TuneError;
 use crate::tune::parameters::Group;
 
@@ -28,8 +29,8 @@ const CHOSEN_ON: u64 = 2000;
 const CHECKED_ON: u64 = 2000;
 /// The criterion is missed on the checked-on by bad luck, there or in the choice, with a probability of 1 %: so many standard deviations.
 const LUCK: f64 = 2.326_347_874_040_841;
-/// Standard deviations that the parameters may be away from what was identified.
-const FARTHEST: f64 = 3.0;
+/// Probability of the region about the identified parameters in which they may move.
+const REGION: f64 = 0.9973;
 /// What a squared standard deviation of movement weighs beside ln(true sigma): it decides only where the price does not.
 const TIE: f64 = 1e-4;
 /// Step of numerical derivatives, standard deviations: the quantile of some hundred sensors is rough.
@@ -116,12 +117,17 @@ pub(super) fn choose(
 }
 
 impl Study<'_> {
+    /// Half axes of the region in standard deviations.
+    fn farthest(&self) -> f64 {
+        chi_square_quantile(REGION, self.group.free.len() as f64).sqrt()
+    }
+
     /// The settled filters of the axes at these shifts.
     fn filters(&self, shifts: &DVector<f64>) -> Result<Vec<Settled>, ObjectiveError> {
         let models = self.problem.models(self.group, shifts.as_slice())?;
         let settled = |model: &LinearModel| {
             let found = Settled::new(model).map_err(self.problem.linalg(self.group))?;
-            found.ok_or_else(|| ObjectiveError::NothingDrifts { axis: self.problem.names(self.group) })
+            found.ok_or_else(|| self.problem.nothing_drifts(self.group))
         };
         models.iter().map(settled).collect()
     }
@@ -159,6 +165,7 @@ impl Study<'_> {
     /// The shifts of least mean error under the criterion, on few sensors.
     fn search(&self) -> Result<DVector<f64>, ObjectiveError> {
         let n = self.group.free.len();
+        let farthest = self.farthest();
         let sensors = self.sensors(0, SEARCHED_ON)?;
         let shifts_of = |x: &[f64]| DVector::from_iterator(n, x.iter().zip(&self.belief.std_devs).map(|(x, s)| x * s));
         // ln(claimed) by the logarithms says where to begin: the most likely parameters that claim enough
@@ -183,7 +190,7 @@ impl Study<'_> {
             let logs = judged.errors.iter().flatten().flatten().map(|sigma| sigma.ln());
             let count = judged.errors.iter().flatten().map(Vec::len).sum::<usize>() as f64;
             let error = logs.sum::<f64>() / count + TIE * distance * distance;
-            [error, quantile.fold(f64::NEG_INFINITY, f64::max), distance - FARTHEST].map(|v| v.min(f64::MAX.sqrt()))
+            [error, quantile.fold(f64::NEG_INFINITY, f64::max), distance - farthest].map(|v| v.min(f64::MAX.sqrt()))
         };
         // the three share their work
         let last: RefCell<Option<Seen>> = RefCell::new(None);
@@ -214,7 +221,7 @@ impl Study<'_> {
         let honest = |x: &[f64], slope: Option<&mut [f64]>, _: &mut ()| evaluate(1, x, slope);
         let near = |x: &[f64], slope: Option<&mut [f64]>, _: &mut ()| evaluate(2, x, slope);
         let constraints: [&dyn Func<()>; 2] = [&honest, &near];
-        let bounds = vec![(-FARTHEST, FARTHEST); n];
+        let bounds = vec![(-farthest, farthest); n];
         let tolerances = StopTols { ftol_abs: 1e-7, xtol_abs: vec![1e-4; n], ..StopTols::default() };
         let (found, from) = match minimize(objective, &x, &bounds, &constraints, (), EVALUATIONS, Some(tolerances)) {
             Ok((_, found, _)) | Err((_, found, _)) => (found, x),
@@ -235,7 +242,7 @@ impl Study<'_> {
             let judged = Study::judge(&self.filters(&(direction * t))?, &sensors);
             Ok(judged.ratios.iter().all(|ratios| share_honest(ratios) >= required()))
         };
-        let farthest = FARTHEST / self.belief.distance(direction).max(f64::MIN_POSITIVE);
+        let farthest = self.farthest() / self.belief.distance(direction).max(f64::MIN_POSITIVE);
         if honest(0.0)? {
             return Ok(DVector::zeros(direction.len()));
         }
@@ -243,7 +250,7 @@ impl Study<'_> {
         while !honest(far)? {
             if far >= farthest {
                 let axis = self.problem.names(self.group);
-                return Err(ObjectiveError::OutOfReach { axis, farthest: FARTHEST, percent: 100.0 * HONEST_SHARE });
+                return Err(ObjectiveError::OutOfReach { axis, percent: 100.0 * HONEST_SHARE });
             }
             far = (1.25 * far).min(farthest);
         }

@@ -6,7 +6,7 @@ use crate::filter::mismatch::expect_settled;
 use crate::filter::{Cycle, Judge};
 use crate::model::{DRIFT, LinearModel, Named};
 use crate::numerics::linalg::LinalgError;
-use crate::tune::closed_loop::{alone, driven, settled};
+use crate::tune::closed_loop::{driven, settled};
 
 /// A settled filter, without the constants that it learns for good.
 pub(super) struct Settled {
@@ -45,7 +45,7 @@ fn outputs(model: &LinearModel) -> (Vec<Named>, DMatrix<f64>) {
 impl Truth {
     pub(super) fn new(model: &LinearModel) -> Truth {
         let kept = driven(model, &model.drift_row());
-        Truth { model: alone(model, &kept), rows: outputs(model).1.select_columns(&kept) }
+        Truth { model: model.part(&kept), rows: outputs(model).1.select_columns(&kept) }
     }
 }
 

@@ -60,4 +60,7 @@ fn a_truth_is_needed_that_the_filter_can_follow() {
     let walk = sensor(10.0, vec![white(0.05), gauss_markov(0.03, 200.0), random_walk(1e-3)], Some(0.5));
     let message = refused(&params, &Request { truth: Some(&walk), ..request(Objective::Nees) });
     assert!(message.contains("grows without bound"), "{message}");
+    let still = sensor(10.0, vec![white(0.05)], Some(0.5));
+    let message = refused(&still, &Request { truth: Some(&still), ..request(Objective::Nees) });
+    assert!(message.contains("--objective nees: axis x: nothing drifts"), "{message}");
 }

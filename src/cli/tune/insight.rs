@@ -16,7 +16,7 @@ const MOST_LINES: usize = 6;
 
 /// Three kinds of tables.
 pub(super) fn text(group: &Group<'_>, insight: &Insight, quantity: Quantity) -> String {
-    let mut out = format!("\n{OBSERVED_CAPTION}\n{}", table(&OBSERVED, &observed_rows(group, insight, quantity)));
+    let mut out = format!("{OBSERVED_CAPTION}\n{}", table(&OBSERVED, &observed_rows(group, insight, quantity)));
     for output in &insight.outputs {
         out.push_str(&format!(
             "\n{}\n{}",

@@ -6,6 +6,8 @@ mod arrays;
 mod damage;
 #[path = "input/measured.rs"]
 mod measured;
+#[path = "input/messages.rs"]
+mod messages;
 #[path = "input/npy.rs"]
 mod npy;
 

@@ -28,7 +28,7 @@ use crate::units::Unit;
 pub struct Args {
     /// The noise parameters
     params: PathBuf,
-    /// The log, sensor at rest: text, .gz or .npy
+    /// The log, sensor at rest, of any format that `kfdesign info` reads
     log: PathBuf,
     /// Probability of a false alarm, over all tests together
     #[arg(long, default_value_t = 0.01, value_name = "P")]

@@ -38,7 +38,7 @@ use crate::units::Quantity;
     after_help = "Example: kfdesign identify static.csv --unit deg/s --rate 100 -o params.json --report identify.html"
 )]
 pub struct Args {
-    /// The log, sensor at rest: text, .gz or .npy; several logs of the same sensor, one per start, also give its turn-on bias
+    /// The log, sensor at rest, of any format that `kfdesign info` reads; several logs of the same sensor, one per start, also give its turn-on bias
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
     /// The parameters: params.json

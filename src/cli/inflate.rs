@@ -20,7 +20,7 @@ use crate::units::Unit;
 pub struct Args {
     /// The noise parameters from the bench
     params: PathBuf,
-    /// A log with vibration, moving or not: text, .gz or .npy
+    /// A log with vibration, moving or not, of any format that `kfdesign info` reads
     log: PathBuf,
     /// Lowest frequency used, in Hz, above all motion [default: a tenth of half the sample rate]
     #[arg(long, value_name = "HZ")]

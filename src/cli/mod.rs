@@ -12,6 +12,7 @@ pub mod export;
 mod flags;
 pub mod identify;
 pub mod inflate;
+pub mod info;
 pub mod log_flags;
 pub mod montecarlo;
 pub mod output;
@@ -51,6 +52,7 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Info(info::Args),
     Allan(allan::Args),
     Identify(identify::Args),
     Plan(plan::Args),
@@ -80,6 +82,7 @@ pub fn main() -> ExitCode {
         }
     };
     let result = match cli.command {
+        Command::Info(args) => info::run(&args),
         Command::Allan(args) => allan::run(&args),
         Command::Identify(args) => identify::run(&args),
         Command::Plan(args) => plan::run(&args),

@@ -30,7 +30,7 @@ use crate::units::{Quantity, Unit};
 pub struct Args {
     /// The design, as written by `tune`: filter.json or attitude.json
     filter: PathBuf,
-    /// The log: text, .gz or .npy
+    /// The log, of any format that `kfdesign info` reads
     log: PathBuf,
     /// Estimates with their sigmas, SI units: .csv, .csv.gz or .npy
     #[arg(short, long, value_name = "FILE")]

@@ -6,6 +6,7 @@ use super::{Status, output};
 use crate::compare::Comparison;
 use crate::compare::inflation::Inflation;
 use crate::filter::{AttitudeDesign, FilterDesign};
+use crate::input::inspect::Inventory;
 use crate::montecarlo;
 use crate::params::Params;
 use crate::replay::ReplayResult;
@@ -28,6 +29,8 @@ enum Document {
     Filter,
     /// attitude.json: the filter of the plant attitude
     Attitude,
+    /// What `info --json` prints
+    Info,
     /// What `replay --json` prints
     Replay,
     /// What `replay --json` prints of an attitude filter
@@ -49,6 +52,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         Document::Montecarlo => montecarlo::document::schema(),
         Document::Compare => schemars::schema_for!(Comparison).to_value(),
         Document::Inflate => schemars::schema_for!(Inflation).to_value(),
+        Document::Info => schemars::schema_for!(Inventory).to_value(),
         Document::Replay => schemars::schema_for!(ReplayResult).to_value(),
     })?;
     Ok(Status::Done)

@@ -69,14 +69,9 @@ impl ArraySource {
             let (group, name) = array.path.rsplit_once(['/', '.']).unwrap_or(("", &array.path));
             let at = groups.iter().position(|(g, n)| g == group && *n == rows).unwrap_or_else(|| {
                 groups.push((group.to_string(), rows));
-                let topic = Topic {
-                    name: array.path.clone(),
-                    aliases: vec![group.to_string()],
-                    heads: Vec::new(),
-                    named: true,
-                    rows: Some(rows),
-                    rank: 0,
-                };
+                let mut topic = Topic::new(array.path.clone(), Vec::new());
+                topic.aliases.push(group.to_string());
+                topic.rows = Some(rows);
                 topics.push(topic);
                 places.push(Vec::new());
                 groups.len() - 1

@@ -36,6 +36,12 @@ impl<'a> Bytes<'a> {
     /// A text that ends at a zero byte or with the bytes.
     pub(super) fn text(bytes: &[u8]) -> String {
         let end = bytes.iter().position(|b| *b == 0).unwrap_or(bytes.len());
-        String::from_utf8_lossy(&bytes[..end]).into_owned()
+        printable(&bytes[..end])
     }
+}
+
+/// A name of a binary file: on one line, whatever is in it.
+pub(super) fn printable(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(bytes);
+    text.chars().map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c }).collect()
 }

@@ -275,7 +275,7 @@ impl Table<'_> {
         Ok((axes, quantity.unwrap_or(Quantity::AngularRate)))
     }
 
-    fn time(&self, options: &LogOptions) -> Result<Option<(usize, Unit)>, InputError> {
+    pub(super) fn time(&self, options: &LogOptions) -> Result<Option<(usize, Unit)>, InputError> {
         let (column, flag) = match options.time.as_deref().map(str::trim) {
             Some("none") => return self.no_time(options),
             Some(text) => self.with_unit(text, Dimension::TIME)?,

@@ -238,7 +238,7 @@ impl Walker<'_> {
             .map(|b| u64::from(if self.big_endian { u32::from_be_bytes(b) } else { u32::from_le_bytes(b) }))
             .collect();
         let name = self.short(from)?;
-        let path = if depth == 0 { String::from_utf8_lossy(&name).into_owned() } else { outer.to_string() };
+        let path = if depth == 0 { super::bytes::printable(&name) } else { outer.to_string() };
         let [rows, columns] = shape[..] else { return Ok(()) };
         match class {
             STRUCTURE if depth < DEEPEST => self.structure(from, &path, rows.saturating_mul(columns), depth),

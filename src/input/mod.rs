@@ -3,15 +3,23 @@
 mod arrays;
 mod bytes;
 mod columns;
+mod dataflash;
 mod hdf5;
+pub mod inspect;
 mod mat;
+mod mcap;
 mod names;
 mod npy;
 mod number;
+mod records;
+mod ros;
+mod rosbag;
 mod sniff;
 mod source;
+mod sqlite;
 mod temperature;
 mod text;
+mod ulog;
 
 use std::io::Read;
 use std::ops::Range;
@@ -131,6 +139,10 @@ trait Table {
     fn place(&self) -> String;
     fn row_place(&self, line: u64) -> String;
     /// `beside`: a column behind the axes, in which text is a missing value.
+    /// What of the file could not be read, after a pass.
+    fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
     fn select(&mut self, time: Option<usize>, axes: &[usize], beside: Option<usize>);
     fn rewind(&mut self) -> Result<(), InputError>;
     /// Number of rows, where it is known to be true.
@@ -298,7 +310,9 @@ impl Log {
             self.enough(checker.rows(), &selection)?;
             match checker.finish() {
                 Outcome::Done { mut check, gaps, axes } => {
-                    check.findings.splice(0..0, self.notes.iter().cloned());
+                    let damage = self.table.notes().into_iter().map(|note| Finding::note("damaged", note));
+                    let damage = damage.map(|note| Finding { serious: true, ..note });
+                    check.findings.splice(0..0, self.notes.iter().cloned().chain(damage));
                     self.usable(&axes, &check)?;
                     let origin = self.choice.time.as_ref().map_or(0.0, |(_, unit)| unit.to_si(self.table.origin()));
                     return Ok(Scan { check, gaps, first_s, start_s: origin + first_s });
@@ -371,6 +385,7 @@ pub struct LogReader {
 
 impl LogReader {
     pub fn open(path: &Path, options: &LogOptions) -> Result<LogReader, InputError> {
+        let path = &source::resolve(path)?;
         let mut log = Log::open(path, options)?;
         let scan = log.scan(|_, _| {})?;
         log.table.rewind()?;
@@ -431,6 +446,7 @@ impl LogReader {
 
 /// The whole log in memory with its check.
 pub fn read(path: &Path, options: &LogOptions) -> Result<(Recording, LogCheck), InputError> {
+    let path = &source::resolve(path)?;
     let mut log = Log::open(path, options)?;
     let beside = usize::from(log.choice.temperature.column.is_some());
     let mut values: Vec<Vec<f64>> = vec![Vec::new(); log.choice.axes.len() + beside];

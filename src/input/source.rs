@@ -2,10 +2,12 @@
 
 use std::fs::File;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::names::Head;
-use super::{InputError, LogOptions, Table, arrays, columns, hdf5, mat, npy, text};
+use super::{
+    InputError, LogOptions, Table, arrays, columns, dataflash, hdf5, mat, mcap, npy, ros, rosbag, sqlite, text, ulog,
+};
 use crate::units::Quantity;
 
 /// One table of a file: a message of a flight log, a topic of a bag, arrays of one length; a text log is one.
@@ -17,10 +19,21 @@ pub(super) struct Topic {
     pub(super) heads: Vec<Head>,
     /// False when the columns have only numbers.
     pub(super) named: bool,
+    /// Of messages: their type.
+    pub(super) kind: String,
     /// Where the file says it, or the reader has counted.
     pub(super) rows: Option<u64>,
+    /// First and last stamp, s, where the reader has counted.
+    pub(super) span_s: Option<(f64, f64)>,
     /// Of several with the sensor that is looked for, the highest is taken: output of a sensor before what was made of it.
     pub(super) rank: u8,
+}
+
+impl Topic {
+    pub(super) fn new(name: String, heads: Vec<Head>) -> Topic {
+        let (aliases, kind) = (Vec::new(), String::new());
+        Topic { name, aliases, heads, named: true, kind, rows: None, span_s: None, rank: 0 }
+    }
 }
 
 /// An open file.
@@ -42,7 +55,7 @@ impl Single {
     fn new(format: &'static str, table: Box<dyn Table + Send>) -> Single {
         let heads = table.heads().into_iter().cloned().collect();
         let (named, rows) = (table.named(), table.rows());
-        let topic = Topic { name: String::new(), aliases: Vec::new(), heads, named, rows, rank: 0 };
+        let topic = Topic { named, rows, ..Topic::new(String::new(), heads) };
         Single { format, topic: [topic], table }
     }
 }
@@ -59,16 +72,38 @@ impl Source for Single {
     }
 }
 
-/// Opens a log of any format.
-pub(super) fn open(path: &Path) -> Result<Box<dyn Source>, InputError> {
+/// The file of a log: itself, or the one in a folder of the EuRoC (ASL) layout or of a ROS 2 bag.
+pub(super) fn resolve(path: &Path) -> Result<PathBuf, InputError> {
     let fail = |what: String| Err(InputError { message: format!("{}: {what}", path.display()) });
     match std::fs::metadata(path) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return fail("there is no such file".into()),
         Err(error) => return fail(format!("cannot read: {error}")),
-        Ok(found) if found.is_dir() => return fail("this is a folder, not a log".into()),
-        Ok(found) if !found.is_file() => return fail("a log is read more than once: save it to a file first".into()),
-        Ok(_) => {}
+        Ok(found) if found.is_file() => return Ok(path.to_path_buf()),
+        Ok(found) if found.is_dir() => {}
+        Ok(_) => return fail("a log is read more than once: save it to a file first".into()),
     }
+    for inside in ["mav0/imu0/data.csv", "imu0/data.csv", "data.csv"] {
+        if path.join(inside).is_file() {
+            return Ok(path.join(inside));
+        }
+    }
+    let files = std::fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut bags: Vec<PathBuf> =
+        files.filter(|file| file.extension().is_some_and(|e| e == "db3" || e == "mcap")).collect();
+    bags.sort();
+    match &mut bags[..] {
+        [] => fail("this is a folder, not a log; it has no data.csv (EuRoC) and no .db3 or .mcap (ROS 2 bag)".into()),
+        [bag] => Ok(std::mem::take(bag)),
+        bags => {
+            let names: Vec<String> = bags.iter().map(|bag| bag.display().to_string()).collect();
+            fail(format!("a bag of several files; give one: {}", names.join(", ")))
+        }
+    }
+}
+
+/// Opens a log of any format.
+pub(super) fn open(path: &Path) -> Result<Box<dyn Source>, InputError> {
+    let fail = |what: String| Err(InputError { message: format!("{}: {what}", path.display()) });
     let mut start = Vec::new();
     if let Err(error) = File::open(path).and_then(|file| file.take(4096).read_to_end(&mut start)) {
         return fail(format!("cannot read: {error}"));
@@ -83,6 +118,22 @@ pub(super) fn open(path: &Path) -> Result<Box<dyn Source>, InputError> {
     }
     if start.starts_with(mat::SIGNATURE) {
         return Ok(Box::new(arrays::ArraySource::new(path, Box::new(mat::Mat::open(path)?))?));
+    }
+    let is = |signature: &[u8]| start.starts_with(signature);
+    if is(ulog::SIGNATURE) {
+        return Ok(Box::new(ulog::open(path)?));
+    }
+    if is(dataflash::SIGNATURE) {
+        return Ok(Box::new(dataflash::open(path)?));
+    }
+    if is(rosbag::SIGNATURE) {
+        return Ok(Box::new(ros::open::<rosbag::Rosbag>(path)?));
+    }
+    if is(mcap::SIGNATURE) {
+        return Ok(Box::new(ros::open::<mcap::Mcap>(path)?));
+    }
+    if is(sqlite::SIGNATURE) {
+        return Ok(Box::new(ros::open::<sqlite::Database>(path)?));
     }
     Ok(Box::new(Single::new("text", Box::new(text::TextTable::open(path)?))))
 }
@@ -101,6 +152,10 @@ pub(super) fn choose(
         let named =
             |topic: &Topic| [&topic.name].into_iter().chain(&topic.aliases).any(|name| is(&name.to_lowercase()));
         return match topics.iter().position(named) {
+            Some(at) if topics[at].heads.is_empty() => {
+                let (name, kind) = (&topics[at].name, &topics[at].kind);
+                fail(format!("topic {name} has messages of the type '{kind}', which are not read; sensor_msgs/Imu are"))
+            }
             Some(topic) => Ok((source.table(topic)?, None)),
             None if topics.len() == 1 && topics[0].name.is_empty() => {
                 fail(format!("--topic {wanted}: this is {} with one table; drop the flag", source.format()))
@@ -108,7 +163,7 @@ pub(super) fn choose(
             None => fail(format!("no topic '{wanted}'; {}", there_are(topics))),
         };
     }
-    if topics.len() == 1 {
+    if topics.len() == 1 && !topics[0].heads.is_empty() {
         return Ok((source.table(0)?, None));
     }
     let quantities: &[Quantity] = match options.sought() {
@@ -148,21 +203,27 @@ pub(super) fn choose(
     fail(format!("{wanted}; choose with --topic and --columns; {}", there_are(topics)))
 }
 
-/// `there are gps (100 rows: 1 'lat', 2 'lon'), …`
+/// `there are imu (100 rows: time gyro_x gyro_y), …`, those with a sensor first; columns only where the list stays short.
 fn there_are(topics: &[Topic]) -> String {
     const MOST: usize = 40;
+    const WITH_COLUMNS: usize = 6;
     let columns = |topic: &Topic| {
         let names: Vec<&str> = topic.heads.iter().take(12).map(|head| head.full.as_str()).collect();
-        let more = if topic.heads.len() > names.len() { " …" } else { "" };
-        format!("{}{more}", names.join(" "))
+        format!(": {}{}", names.join(" "), if topic.heads.len() > names.len() { " …" } else { "" })
     };
-    let one = |topic: &Topic| match topic.rows {
-        Some(rows) => format!("{} ({rows} rows: {})", topic.name, columns(topic)),
-        None => format!("{} ({})", topic.name, columns(topic)),
+    let one = |topic: &Topic| {
+        let rows = topic.rows.unwrap_or(0);
+        match (topic.heads.is_empty(), topics.len() <= WITH_COLUMNS) {
+            (true, _) => format!("{} ({rows} {})", topic.name, topic.kind),
+            (false, true) => format!("{} ({rows} rows{})", topic.name, columns(topic)),
+            (false, false) => format!("{} ({rows} rows)", topic.name),
+        }
     };
-    let mut list: Vec<String> = topics.iter().take(MOST).map(one).collect();
+    let mut order: Vec<&Topic> = topics.iter().collect();
+    order.sort_by_key(|topic| std::cmp::Reverse(topic.rank));
+    let mut list: Vec<String> = order.into_iter().take(MOST).map(one).collect();
     if topics.len() > MOST {
-        list.push(format!("… {} in all", topics.len()));
+        list.push(format!("… {} in all (kfdesign info lists them)", topics.len()));
     }
     format!("there are {}", list.join(", "))
 }

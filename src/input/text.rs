@@ -242,11 +242,11 @@ fn not_text(bytes: &[u8]) -> Option<String> {
     const KNOWN: [(&[u8], &str); 12] = [
         (b"\x89HDF", "an HDF5 file, compressed as a whole"),
         (b"MATLAB ", "a MATLAB file, compressed as a whole"),
-        (b"ULog\x01\x12\x35", "a PX4 ULog"),
-        (b"#ROSBAG V", "a ROS bag"),
-        (b"\x89MCAP", "an MCAP file"),
-        (b"SQLite format 3", "a database (ROS 2 bag?)"),
-        (b"\xa3\x95", "an ArduPilot DataFlash log"),
+        (b"ULog\x01\x12\x35", "a PX4 ULog, compressed as a whole"),
+        (b"#ROSBAG V", "a ROS bag of another version than 2.0, or compressed as a whole"),
+        (b"\x89MCAP", "an MCAP file, compressed as a whole"),
+        (b"SQLite format 3", "a database, compressed as a whole"),
+        (b"\xa3\x95", "an ArduPilot DataFlash log that does not begin with a message, or is compressed as a whole"),
         (b"H Product:Blackbox", "a Betaflight blackbox log"),
         (b"PAR1", "a Parquet file"),
         (b"PK\x03\x04", "a zip archive (npz, xlsx?)"),
@@ -259,5 +259,7 @@ fn not_text(bytes: &[u8]) -> Option<String> {
         None if bytes.contains(&0) => "a binary file",
         None => return None,
     };
-    Some(format!("this is {what}; text (csv, also .gz), .npy, MATLAB and HDF5 files are read"))
+    Some(format!(
+        "this is {what}; text (csv, also .gz), .npy, MATLAB, HDF5, ULog, DataFlash .bin, ROS bags and MCAP are read"
+    ))
 }

@@ -40,7 +40,8 @@ pub enum TimeBase {
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Finding {
     /// Short code: "jitter", "gap", "repeated-stamp", "backward-stamp", "rate", "zero-row", "repeated-row", "nan", "stuck",
-    /// "saturated", "quantised", "outlier", "motion", "temperature", "topic".
+    /// "saturated", "quantised", "outlier", "motion", "temperature", "topic",
+    /// "damaged".
     pub kind: String,
     pub axis: Option<String>,
     pub count: u64,

@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 use super::{Flags, read_bytes};
 
 /// Cuts the file at every 1 % and changes up to eight bytes of it, `count` times with a fixed seed; half of the changes are
-/// near the beginning, where the structure is. A panic or an abort fails the test, and so does a minute for one file.
-pub fn survives(name: &str, bytes: &[u8], flags: &[Flags], count: u64) {
+/// near the beginning, where the structure is. Returns the longest time for one file. A panic or an abort fails the test, and so does a minute for one file.
+pub fn survives(name: &str, bytes: &[u8], flags: &[Flags], count: u64) -> Duration {
     let cuts = (0..100).map(|percent| bytes[..bytes.len() * percent / 100].to_vec());
     let mut state = 0x9e37_79b9_7f4a_7c15u64;
     let mut draw = move || {
@@ -24,11 +24,14 @@ pub fn survives(name: &str, bytes: &[u8], flags: &[Flags], count: u64) {
         }
         copy
     });
+    let mut slowest = Duration::ZERO;
     for damaged in cuts.chain(changed) {
         for flags in flags {
             let began = Instant::now();
             let _ = read_bytes(name, &damaged, flags);
+            slowest = slowest.max(began.elapsed());
             assert!(began.elapsed() < Duration::from_secs(60), "{name}: {:?}", began.elapsed());
         }
     }
+    slowest
 }

@@ -1,6 +1,6 @@
 //! Measured logs: counts, rates, first and last values and means as an independent reader gives them, and known defects.
 
-use kfdesign::input;
+use kfdesign::input::{self, Block, LogReader};
 use kfdesign::signal::check::TimeBase;
 
 use super::super::support::measured;
@@ -331,11 +331,52 @@ fn measured_logs_that_are_refused_say_why() {
             &[],
             "line 6282: time goes back",
         ),
-        ("formats/ulog/pyulog_sample.ulg", &[], "this is a PX4 ULog"),
+        ("formats/betaflight/blackbox-library_normal.bfl", &[], "this is a Betaflight blackbox log"),
     ];
     for (path, flags, words) in table {
         let Some(path) = measured(path) else { return };
         let message = input::read(&path, &options(flags)).unwrap_err().to_string();
         assert!(message.contains(words), "{message}");
+    }
+}
+
+/// What an independent reader says of a file: samples, mean rate, first stamp, and first and last value and mean per axis.
+pub struct Independent {
+    pub path: &'static str,
+    pub start_s: f64,
+    pub flags: Flags<'static>,
+    pub samples: usize,
+    /// Of a log with gaps: (samples − 1) / (last stamp − first).
+    pub rate_hz: f64,
+    pub axes: [[f64; 3]; 3],
+}
+
+impl Independent {
+    pub fn check(&self) {
+        let Some(path) = measured(self.path) else { return };
+        let options = options(self.flags);
+        let (log, _) = input::read(&path, &options).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(log.len(), self.samples, "{}", self.path);
+        assert!((log.start_s - self.start_s).abs() <= 1e-9 * self.start_s, "{}: {}", self.path, log.start_s);
+        // each gap is a whole number of periods only to half a period
+        let missing: u64 = log.gaps.iter().map(|gap| gap.missing).sum();
+        let rate_hz = self.rate_hz * (1.0 + missing as f64 / (log.len() - 1) as f64);
+        let tolerance = 1e-9 + 0.5 * log.gaps.len() as f64 / log.len() as f64;
+        assert!((log.sample_rate_hz / rate_hz - 1.0).abs() < tolerance, "{}: {}", self.path, log.sample_rate_hz);
+        for (axis, [first, last, mean]) in self.axes.into_iter().enumerate() {
+            let values = shown(&log, axis);
+            // conversion to SI and back rounds twice
+            assert_close(&[values[0], values[values.len() - 1]], &[first, last], self.path);
+            let sum: f64 = values.iter().sum();
+            assert!((sum / values.len() as f64 - mean).abs() <= 1e-9 * mean.abs().max(0.01), "{}: {sum}", self.path);
+        }
+        // and in blocks
+        let mut reader = LogReader::open(&path, &options).unwrap();
+        let (mut block, mut rows) = (Block::default(), 0);
+        while reader.next_block(&mut block).unwrap() {
+            assert_eq!(block.values[2][0].to_bits(), log.axes[2].values[rows].to_bits());
+            rows += block.values[2].len();
+        }
+        assert_eq!(rows, log.len());
     }
 }

@@ -1,0 +1,270 @@
+//! ArduPilot DataFlash logs (`.bin`).
+//!
+//! Format: ArduPilot, libraries/AP_Logger: each message is 0xA3, 0x95, its type and its fields; `FMT` messages say how long the messages
+//! of a type are and what their fields are called. Bytes that are no message are passed over and counted. Units are those of the
+//! message documentation of ArduPilot: rad/s, m/s/s, degC, and time by the name of its field.
+
+use std::fs::File;
+use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::path::Path;
+
+use super::InputError;
+use super::bytes::Bytes;
+use super::names::Head;
+use super::number::{Kind, Number, Split};
+use super::records::{Field, Messages, RecordSource, failure, head, instance, tally};
+use super::source::Topic;
+
+pub(super) const SIGNATURE: &[u8] = &[0xa3, 0x95, FORMAT];
+
+const FORMAT: u8 = 128;
+const FORMAT_SIZE: usize = 89;
+
+/// Messages of one type.
+#[derive(Clone, Debug)]
+struct Form {
+    name: String,
+    /// With its three first bytes.
+    size: usize,
+    fields: Vec<Field>,
+    /// The field that tells sensors of one kind apart.
+    instance: Option<Field>,
+}
+
+/// Opens a log and counts what is in it.
+pub(super) fn open(path: &Path) -> Result<RecordSource, InputError> {
+    let fail = |what: String| failure(path, &what);
+    let mut scanner = Scanner::open(path).map_err(fail)?;
+    let mut topics: Vec<Topic> = Vec::new();
+    while let Some(kind) = scanner.next().map_err(fail)? {
+        let Some(form) = &scanner.forms[usize::from(kind)] else { continue };
+        let Some(time) = form.fields.first() else { continue };
+        let name = form.topic(&scanner.message);
+        let at = topics.iter().position(|topic| topic.name == name).unwrap_or_else(|| {
+            let heads: Vec<Head> = form.fields.iter().map(|field| field.head.clone()).collect();
+            let raw = ["GYR", "ACC", "IMU"].iter().any(|sensor| form.name.starts_with(sensor));
+            topics.push(Topic { rank: u8::from(raw), ..Topic::new(name, heads) });
+            topics.len() - 1
+        });
+        let unit_s = time.head.unit.as_ref().map_or(f64::NAN, |unit| unit.to_si(1.0));
+        tally(&mut topics[at], unit_s.is_finite().then(|| time.decode(&scanner.message)), unit_s);
+    }
+    if topics.is_empty() {
+        return Err(fail("no data in it".into()));
+    }
+    let (file, names) = (path.to_path_buf(), topics.iter().map(|topic| topic.name.clone()).collect::<Vec<_>>());
+    let messages = move |topic: usize| {
+        let scanner = Scanner::open(&file)?;
+        Ok(Box::new(DataflashTopic { scanner, name: names[topic].clone() }) as Box<dyn Messages>)
+    };
+    let (format, path) = ("ArduPilot DataFlash log", path.to_path_buf());
+    Ok(RecordSource { format, path, topics, messages: Box::new(messages) })
+}
+
+impl Form {
+    /// What a `FMT` message says: the type and its form.
+    fn parse(message: &[u8]) -> Option<(u8, Form)> {
+        let mut bytes = Bytes(message);
+        let (kind, size) = (bytes.u8().ok()?, usize::from(bytes.u8().ok()?));
+        let name = Bytes::text(bytes.take(4).ok()?);
+        let codes = Bytes::text(bytes.take(16).ok()?);
+        let labels = Bytes::text(bytes.take(64).ok()?);
+        let (mut fields, mut instance, mut at) = (Vec::new(), None, 0);
+        for (code, label) in codes.chars().zip(labels.split(',')) {
+            use Kind::{Float, Signed, Unsigned};
+            let (kind, factor) = match code {
+                'b' => (Signed(1), 1.0),
+                'B' | 'M' => (Unsigned(1), 1.0),
+                'h' => (Signed(2), 1.0),
+                'H' => (Unsigned(2), 1.0),
+                'i' => (Signed(4), 1.0),
+                'I' => (Unsigned(4), 1.0),
+                'q' => (Signed(8), 1.0),
+                'Q' => (Unsigned(8), 1.0),
+                'g' => (Float(2), 1.0),
+                'f' => (Float(4), 1.0),
+                'd' => (Float(8), 1.0),
+                'c' => (Signed(2), 0.01),
+                'C' => (Unsigned(2), 0.01),
+                'e' => (Signed(4), 0.01),
+                'E' => (Unsigned(4), 0.01),
+                'L' => (Signed(4), 1e-7),
+                // text, and blocks of numbers
+                'n' | 'N' | 'Z' | 'a' => {
+                    at += match code {
+                        'n' => 4,
+                        'N' => 16,
+                        _ => 64,
+                    };
+                    continue;
+                }
+                _ => return None,
+            };
+            let number = Number { kind, big_endian: false };
+            let field = Field { head: column(&name, label), at, number, factor, over_us: None };
+            at = field.end();
+            if label == "I" && code == 'B' {
+                instance = Some(field.clone());
+            }
+            fields.push(field);
+        }
+        (at + 3 <= size).then_some((kind, Form { name, size, fields, instance }))
+    }
+
+    /// The name of the topic of a message.
+    fn topic(&self, message: &[u8]) -> String {
+        match &self.instance {
+            Some(field) => instance(&self.name, field.decode(message).0 as u64),
+            None => self.name.clone(),
+        }
+    }
+}
+
+/// A field as a column. Only the messages of the sensors themselves are known by name.
+fn column(message: &str, label: &str) -> Head {
+    let sensor = |name: &str| message.trim_end_matches(|c: char| c.is_ascii_digit()) == name;
+    let unit = match label {
+        "GyrX" | "GyrY" | "GyrZ" if sensor("IMU") || sensor("GYR") => Some("rad/s"),
+        "AccX" | "AccY" | "AccZ" if sensor("IMU") || sensor("ACC") => Some("m/s^2"),
+        "T" | "Temp" if sensor("IMU") => Some("degC"),
+        "TimeUS" | "SampleUS" => Some("us"),
+        "TimeMS" => Some("ms"),
+        _ => None,
+    };
+    match label {
+        "TimeUS" | "TimeMS" => head(label, "time", unit),
+        "T" if unit.is_some() => head(label, "temperature", unit),
+        _ => head(label, label, unit),
+    }
+}
+
+/// The messages of one topic.
+struct DataflashTopic {
+    scanner: Scanner,
+    name: String,
+}
+
+impl Messages for DataflashTopic {
+    fn rewind(&mut self) -> Result<(), String> {
+        self.scanner.rewind()
+    }
+    fn next(&mut self, row: &mut Vec<Split>) -> Result<bool, String> {
+        while let Some(kind) = self.scanner.next()? {
+            let Some(form) = &self.scanner.forms[usize::from(kind)] else { continue };
+            if self.name.starts_with(&form.name) && form.topic(&self.scanner.message) == self.name {
+                row.extend(form.fields.iter().map(|field| field.decode(&self.scanner.message)));
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+    fn damage(&self) -> Option<String> {
+        self.scanner.damage()
+    }
+}
+
+/// Message after message of the file.
+struct Scanner {
+    reader: BufReader<File>,
+    length: u64,
+    /// Bytes of the file before the window.
+    read: u64,
+    /// What was read and is not yet used.
+    window: Vec<u8>,
+    at: usize,
+    forms: Vec<Option<Form>>,
+    passed_over: u64,
+    first_damage: Option<u64>,
+    message: Vec<u8>,
+}
+
+impl Scanner {
+    fn open(path: &Path) -> Result<Scanner, String> {
+        let io = |error: std::io::Error| format!("cannot read: {error}");
+        let file = File::open(path).map_err(io)?;
+        let length = file.metadata().map_err(io)?.len();
+        let mut scanner = Scanner {
+            reader: BufReader::with_capacity(1 << 16, file),
+            length,
+            read: 0,
+            window: Vec::new(),
+            at: 0,
+            forms: Vec::new(),
+            passed_over: 0,
+            first_damage: None,
+            message: Vec::new(),
+        };
+        scanner.rewind()?;
+        Ok(scanner)
+    }
+
+    fn rewind(&mut self) -> Result<(), String> {
+        self.reader.seek(SeekFrom::Start(0)).map_err(|error| format!("cannot read: {error}"))?;
+        self.window.clear();
+        (self.at, self.read, self.passed_over, self.first_damage) = (0, 0, 0, None);
+        self.forms = vec![None; 256];
+        Ok(())
+    }
+
+    fn damage(&self) -> Option<String> {
+        let first = self.first_damage?;
+        Some(format!("damaged at byte {first}: {} of {} bytes were passed over", self.passed_over, self.length))
+    }
+
+    /// At least `count` bytes in the window, if the file has them.
+    fn fill(&mut self, count: usize) -> Result<bool, String> {
+        if self.window.len() - self.at < count {
+            self.window.drain(..self.at);
+            self.read += self.at as u64;
+            self.at = 0;
+            let wanted = (1 << 16) as u64;
+            let read = (&mut self.reader).take(wanted).read_to_end(&mut self.window);
+            read.map_err(|error| format!("cannot read on: {error}"))?;
+        }
+        Ok(self.window.len() - self.at >= count)
+    }
+
+    /// The type of the next message that is not a `FMT`; its fields are in `message`.
+    fn next(&mut self) -> Result<Option<u8>, String> {
+        loop {
+            if !self.fill(3)? {
+                self.pass_over(self.window.len() - self.at);
+                return Ok(None);
+            }
+            let start = &self.window[self.at..];
+            let kind = start[2];
+            let size = match &self.forms[usize::from(kind)] {
+                _ if start[..2] != [0xa3, 0x95] => None,
+                _ if kind == FORMAT => Some(FORMAT_SIZE),
+                form => form.as_ref().map(|form| form.size),
+            };
+            let Some(size) = size else {
+                self.pass_over(1);
+                continue;
+            };
+            if !self.fill(size)? {
+                // the file ends inside it, or it is none
+                self.pass_over(1);
+                continue;
+            }
+            self.message.clear();
+            self.message.extend_from_slice(&self.window[self.at + 3..self.at + size]);
+            self.at += size;
+            if kind == FORMAT {
+                if let Some((kind, form)) = Form::parse(&self.message) {
+                    self.forms[usize::from(kind)] = Some(form);
+                }
+                continue;
+            }
+            return Ok(Some(kind));
+        }
+    }
+
+    fn pass_over(&mut self, bytes: usize) {
+        if bytes > 0 {
+            self.first_damage.get_or_insert(self.read + self.at as u64);
+            self.passed_over += bytes as u64;
+            self.at += bytes;
+        }
+    }
+}

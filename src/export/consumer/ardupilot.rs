@@ -11,7 +11,7 @@ pub(super) fn write(export: &Export) -> Result<Written, String> {
     let dt = export.rate_hz.map_or(STEP, |rate| 1.0 / rate);
     let mut warnings = Vec::new();
     let step = format!("per step of EKF3: dt = {} s (EKF_TARGET_DT)", plain(dt));
-    let mut text = export.walk_head("#", &["ArduPilot EKF3: N/sqrt(dt) and K/sqrt(dt), ", &step]);
+    let mut text = export.walk_head("#", &["ArduPilot EKF3: N/sqrt(dt) and K/sqrt(dt)", &step]);
     let sensors = [
         (Quantity::AngularRate, "EK3_GYRO_P_NSE", [0.0001, 0.1], "EK3_GBIAS_P_NSE", [0.00001, 0.001]),
         (Quantity::SpecificForce, "EK3_ACC_P_NSE", [0.01, 1.0], "EK3_ABIAS_P_NSE", [0.00001, 0.02]),

@@ -1,7 +1,7 @@
 //! Kalibr, `imu.yaml`. Source: ethz-asl/kalibr, kalibr_common/ConfigReader.py: continuous densities; the white ones are divided by √dt
 //! there, the walks are used as they are; all four must be positive.
 
-use super::{Export, Written, exponent};
+use super::{Export, Written, exponent, walk_unit};
 use crate::units::Quantity;
 
 pub(super) fn write(export: &Export) -> Result<Written, String> {
@@ -31,7 +31,7 @@ pub(super) fn four(export: &Export, indent: &str, text: &mut String, warnings: &
                     ));
                 }
                 text.push_str(&format!("{indent}{name}_noise_density: {}  # {unit}/sqrt(Hz)\n", exponent(white)));
-                text.push_str(&format!("{indent}{name}_random_walk: {}  # {unit}/s/sqrt(Hz)\n", exponent(walk)));
+                text.push_str(&format!("{indent}{name}_random_walk: {}  # {}\n", exponent(walk), walk_unit(quantity)));
             }
             _ => {
                 warnings.push(format!("the {name} is missing, and the reader needs it: give {flag}"));

@@ -123,12 +123,13 @@ impl Export {
                         .map_or_else(String::new, |[low, high]| format!(" [{}, {}]", exponent(low), exponent(high)))
                 };
                 lines.push(format!(
-                    "{}: N = {}{} {unit}/sqrt(Hz), K = {}{} {unit}/s/sqrt(Hz)",
+                    "{}: N = {}{} {unit}/sqrt(Hz), K = {}{} {}",
                     axis.name,
                     exponent(axis.white.value),
                     interval(&axis.white),
                     exponent(axis.walk.value),
-                    interval(&axis.walk)
+                    interval(&axis.walk),
+                    walk_unit(sensor.quantity)
                 ));
                 for process in &axis.processes {
                     lines.push(format!(
@@ -175,6 +176,14 @@ impl Export {
         let lines: Vec<&str> =
             interpretation.iter().copied().chain(words.iter().map(String::as_str)).chain([choice.as_str()]).collect();
         self.head(mark, &lines)
+    }
+}
+
+/// Of K.
+fn walk_unit(quantity: Quantity) -> &'static str {
+    match quantity {
+        Quantity::AngularRate => "rad/s^2/sqrt(Hz)",
+        Quantity::SpecificForce => "m/s^3/sqrt(Hz)",
     }
 }
 

@@ -1,7 +1,7 @@
 //! ORB-SLAM3 yaml. Source: UZ-SLAMLab/ORB_SLAM3, src/ImuTypes.cc, Settings.cc: white times √IMU.Frequency, walk over it, so that field must be the true
 //! rate; numbers must be real (with a decimal point).
 
-use super::{Export, Written, exponent};
+use super::{Export, Written, exponent, walk_unit};
 use crate::units::Quantity;
 
 pub(super) fn write(export: &Export) -> Result<Written, String> {
@@ -23,7 +23,7 @@ pub(super) fn write(export: &Export) -> Result<Written, String> {
         match (export.white(quantity)?, export.walk(quantity)?) {
             (Some(white), Some(walk)) => {
                 text.push_str(&format!("IMU.Noise{name}: {}  # {unit}/sqrt(Hz)\n", exponent(white)));
-                text.push_str(&format!("IMU.{name}Walk: {}  # {unit}/s/sqrt(Hz)\n", exponent(walk)));
+                text.push_str(&format!("IMU.{name}Walk: {}  # {}\n", exponent(walk), walk_unit(quantity)));
             }
             _ => {
                 warnings.push(complaint.to_owned());

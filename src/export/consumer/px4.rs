@@ -12,7 +12,7 @@ pub(super) fn write(export: &Export) -> Result<Written, String> {
     let mut warnings = Vec::new();
     let step =
         format!("per step of EKF2: dt = {} s (EKF2_PREDICT_US); with another step these numbers are wrong", plain(dt));
-    let mut text = export.walk_head("#", &["PX4 EKF2: N/sqrt(dt) and K/sqrt(dt), ", &step]);
+    let mut text = export.walk_head("#", &["PX4 EKF2: N/sqrt(dt) and K/sqrt(dt)", &step]);
     text.push_str("# Vehicle-Id Component-Id Name Value Type\n");
     let mut put = |name: &str, value: f64, low: f64, high: f64| {
         let value = clamped(name, value, low, high, &mut warnings);

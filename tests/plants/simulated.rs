@@ -54,7 +54,7 @@ fn a_simulated_flight_is_consistent_with_its_design() {
 fn headings_are_the_angle_with_their_errors() {
     let params = gyro(HEADING);
     let design = params.design.clone().unwrap();
-    let mut square = 0.0;
+    let (mut square, mut steps) = (0.0, 0.0);
     for run in 0..60 {
         let scenario = Scenario {
             seed: 3,
@@ -86,18 +86,25 @@ fn headings_are_the_angle_with_their_errors() {
         }
         // 30 deg/s for a minute: five turns
         assert!((angle[5999] - 30.0 * DEG * DT * 5999.0).abs() < 1e-9);
-        let mut sum = 0.0;
+        let (mut sum, mut before) = (0.0, f64::NAN);
         for (k, z) in heading.iter().enumerate() {
             assert_eq!(z.is_finite(), k % 100 == 0);
             if z.is_finite() {
                 assert!(z.abs() <= std::f64::consts::PI);
                 let turns = ((z - angle[k]) / std::f64::consts::TAU).round();
-                sum += (z - angle[k] - turns * std::f64::consts::TAU).powi(2);
+                let error = z - angle[k] - turns * std::f64::consts::TAU;
+                sum += error.powi(2);
+                steps += if before.is_nan() { 0.0 } else { (error - before).powi(2) };
+                before = error;
             }
         }
         square += sum / 60.0 / (13.0 * DEG * DEG);
     }
     assert!((26.0..110.0).contains(&square), "{square}");
+    // from one heading to the next: 2 (2 deg)² and 2 (3 deg)² (1 − e^(−1/60)); the mean of 3540 squares, neighbours sharing a value, has a relative
+    // standard deviation of √(3/3540) = 2.9 %: five are 15 %
+    let expected = (8.0 + 18.0 * -(-1.0_f64 / 60.0).exp_m1()) * DEG * DEG;
+    assert!((steps / 3540.0 / expected - 1.0).abs() < 0.15, "{} {expected}", steps / 3540.0);
 }
 
 /// The gate's power is told of aids too. 50 runs of 100 s have 5050 headings: mean NIS has a standard deviation of √(2/5050) = 2 %, and a σ that

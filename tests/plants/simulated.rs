@@ -107,7 +107,7 @@ fn headings_are_the_angle_with_their_errors() {
     assert!((steps / 3540.0 / expected - 1.0).abs() < 0.15, "{} {expected}", steps / 3540.0);
 }
 
-/// The gate's power is told of aids too. 50 runs of 100 s have 5050 headings: mean NIS has a standard deviation of √(2/5050) = 2 %, and a σ that
+/// The gate's power is told of aids too. 25 runs of 200 s have 5025 headings: mean NIS has a standard deviation of √(2/5025) = 2 %, and a σ that
 /// is f times too large makes it about 1/f². Seen with 90 % by one of some thirty tests at 1 % together: some five standard deviations, f near 1.05.
 #[test]
 fn the_gate_says_what_it_sees_of_an_aid() {
@@ -118,7 +118,7 @@ fn the_gate_says_what_it_sees_of_an_aid() {
     );
     bench.ok("tune angle.json -o filter.json");
     let printed: Value =
-        serde_json::from_str(&bench.ok("montecarlo filter.json --runs 50 --duration 100s --power --json")).unwrap();
+        serde_json::from_str(&bench.ok("montecarlo filter.json --runs 25 --duration 200s --power --json")).unwrap();
     let detects = printed["detects"].as_array().unwrap();
     let aid = detects.iter().find(|d| d["parameter"] == "heading.std_dev").unwrap_or_else(|| panic!("{detects:?}"));
     let (large, small) = (aid["too_large"]["size"].as_f64().unwrap(), aid["too_small"]["size"].as_f64().unwrap());

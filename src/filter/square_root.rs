@@ -1,5 +1,5 @@
 //! Kalman filter on a triangular factor of the covariance, P = S Sᵀ: no difference of large numbers is ever formed, and the digits of P are those of S
-//! twice over. Same convention, same results as [`Kalman`](super::Kalman); it goes on where P in double precision has lost its definiteness.
+//! twice over. Same convention, same results as [`Kalman`]; it goes on where P in double precision has lost its definiteness.
 //!
 //! Both steps are one orthogonal triangularisation (Householder) of an array whose Gram matrix is the covariance wanted:
 //! prediction [F S, Q^½]ᵀ → S⁺ᵀ, and for a scalar measurement [[√r, 0], [Sᵀhᵀ, Sᵀ]] → [[√s, k̄ᵀ], [0, S⁺ᵀ]] with K = k̄/√s.

@@ -60,7 +60,8 @@ impl Options {
         }
         match self.gate {
             Some(gate) if !(gate >= 1.0 && gate.is_finite()) => {
-                Err(ReplayError::Option { name: "gate", value: gate, expected: "at least 1 (sigmas)" })
+                let name = if self.clip { "robust" } else { "gate" };
+                Err(ReplayError::Option { name, value: gate, expected: "at least 1 (sigmas)" })
             }
             _ => Ok(()),
         }

@@ -74,6 +74,8 @@ fn outliers_of_an_aid_are_clipped() {
     assert!(clipped < 2.0 * sigma && plain > 2.0 * clipped, "{plain} {clipped} {sigma}");
     // a gate keeps them out too, and its count is judged
     let gated = run("--gate 3", 1);
+    let refused = bench.run(&format!("{RUN} --robust 0.5"));
+    assert!(refused.status == 2 && refused.stderr.contains("robust is 0.5, expected at least 1"), "{}", refused.stderr);
     assert!(gated["tests"].as_array().unwrap().iter().any(|t| t["name"] == "rejected" && t["pass"] == false));
 }
 

@@ -30,7 +30,7 @@ pub struct NeesAxis {
     pub axis: String,
     /// The states of the plant and the drift.
     pub outputs: Vec<String>,
-    /// E[e²]/σ² of each, as identified.
+    /// `E[e²]/σ²` of each, as identified.
     pub nees_before: Vec<f64>,
     pub nees: Vec<f64>,
     /// E[ν²/S], mean over the measurements.

@@ -14,7 +14,10 @@ use crate::model::LinearModel;
 pub struct ConstantGain {
     /// Holds x, and the claimed P.
     kalman: Kalman,
+    f: DMatrix<f64>,
     h: DMatrix<f64>,
+    /// x of the sample before.
+    before: DVector<f64>,
     /// Gain and S of every measurement.
     gains: Vec<(DVector<f64>, f64)>,
 }
@@ -35,7 +38,7 @@ impl ConstantGain {
             kalman.p[(i, i)] = model.p0[(i, i)];
         }
         kalman.x.copy_from(&model.x0);
-        ConstantGain { kalman, h: model.h.clone(), gains }
+        ConstantGain { kalman, f: model.f.clone(), h: model.h.clone(), before: model.x0.clone(), gains }
     }
 
     pub fn x(&self) -> &DVector<f64> {
@@ -49,9 +52,18 @@ impl ConstantGain {
 
     /// As [`Kalman::advance`], x alone.
     pub fn advance(&mut self, steps: u64, input: Option<f64>) {
-        let p = self.kalman.p.clone();
+        if steps == 1 {
+            self.before.copy_from(&self.kalman.x);
+            self.kalman.x.gemv(1.0, &self.f, &self.before, 0.0);
+            if let Some(u) = input {
+                self.kalman.drive(&[u]);
+            }
+            return;
+        }
+        // over a gap, with the powers of F that the filter has
+        let claimed = self.kalman.p.clone();
         self.kalman.advance(steps, input);
-        self.kalman.p = p;
+        self.kalman.p = claimed;
     }
 
     /// As [`Kalman::update`] with the constant gain and S.

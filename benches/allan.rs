@@ -38,10 +38,39 @@ fn plain(rate: &[f64], factors: &[u64]) -> Vec<f64> {
 
 fn ours(rate: &[f64], factors: &[u64]) -> Vec<f64> {
     let phase = deviation::phase(rate, DT);
+    let estimates = deviation::variances(Deviation::Oadev, &phase, DT, factors).expect("all factors fit");
+    estimates.iter().map(|estimate| estimate.variance.sqrt()).collect()
+}
+
+/// The grid of the side-by-side with other programs: 100 factors equally spaced in their logarithm up to a tenth of the log, distinct.
+fn peers_factors(samples: usize) -> Vec<u64> {
+    let top = (samples as f64 / 10.0).floor().log2();
+    let mut factors: Vec<u64> = (0..100).map(|i| (top * f64::from(i) / 99.0).exp2().round() as u64).collect();
+    factors.dedup();
     factors
-        .iter()
-        .map(|&m| deviation::variance(Deviation::Oadev, &phase, DT, m).expect("m fits").variance.sqrt())
-        .collect()
+}
+
+/// On the data of the side-by-side, where KFDESIGN_BENCH_DATA names its folder: the median of seven, one line per file.
+#[allow(clippy::print_stdout, reason = "the line is read by a script")]
+fn peers(_: &mut Criterion) {
+    let Some(folder) = std::env::var_os("KFDESIGN_BENCH_DATA") else { return };
+    for name in ["rate_1e6", "rate_1e7"] {
+        let path = std::path::Path::new(&folder).join(name).with_extension("f64");
+        let Ok(bytes) = std::fs::read(&path) else { continue };
+        let rate: Vec<f64> = bytes.as_chunks::<8>().0.iter().map(|value| f64::from_le_bytes(*value)).collect();
+        drop(bytes);
+        let factors = peers_factors(rate.len());
+        let mut seconds: Vec<f64> = (0..7)
+            .map(|_| {
+                let start = std::time::Instant::now();
+                black_box(ours(black_box(&rate), &factors));
+                start.elapsed().as_secs_f64()
+            })
+            .collect();
+        seconds.sort_by(f64::total_cmp);
+        let (median, threads) = (seconds[seconds.len() / 2], rayon::current_num_threads());
+        println!("peers: allan seconds {median:.4} samples {} taus {} threads {threads}", rate.len(), factors.len());
+    }
 }
 
 fn overlapping(criterion: &mut Criterion) {
@@ -53,7 +82,11 @@ fn overlapping(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("overlapping ADEV, 1e6 samples, log:20");
     group.sample_size(10);
     group.bench_function("plain reference", |b| b.iter(|| plain(black_box(&rate), &factors)));
-    group.bench_function("deviation::variance, one thread", |b| b.iter(|| ours(black_box(&rate), &factors)));
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+    group.bench_function("deviation::variances, one thread", |b| {
+        b.iter(|| one.install(|| ours(black_box(&rate), &factors)));
+    });
+    group.bench_function("deviation::variances, all threads", |b| b.iter(|| ours(black_box(&rate), &factors)));
     group.bench_function("allan::curve, with noise types and intervals", |b| {
         b.iter(|| kfdesign::allan::curve(black_box(&rate), DT, Deviation::Oadev, TauGrid::Log(20)));
     });
@@ -80,5 +113,5 @@ fn degrees_of_freedom(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, overlapping, degrees_of_freedom);
+criterion_group!(benches, peers, overlapping, degrees_of_freedom);
 criterion_main!(benches);

@@ -4,6 +4,7 @@
 
 mod command;
 mod covariance;
+mod definition;
 mod degrees_of_freedom;
 mod identification;
 mod quadratic_form;
@@ -13,6 +14,7 @@ mod wavelet;
 use kfdesign::allan::{self, AllanError, Deviation, NoiseType, TauGrid, deviation, edf, noise_id, tau};
 use kfdesign::noise::{NoiseModel, Term};
 use kfdesign::numerics::distribution::chi_square_quantile;
+use kfdesign::numerics::exact_sum::ExactSum;
 use kfdesign::numerics::random::{StreamId, fill_normal, stream};
 use nalgebra::{DMatrix, DVector};
 

@@ -1,32 +1,20 @@
 //! The Allan family on phase: each deviation is a mean square of differences, O(n) per averaging factor.
 //!
 //! Everything is computed from the phase θ (angle for a gyro, velocity for an accelerometer), made from the rate by one
-//! compensated prefix sum, or given directly when the log holds the integral. With x the phase, N = n + 1 points of it,
+//! prefix sum, or given directly when the log holds the integral. With x the phase, N = n + 1 points of it,
 //! tau = m dt (Riley 2008, NIST SP 1065, sections 5.2.2 to 5.2.11).
 
-use super::{AllanError, Deviation};
-use crate::numerics::reduce::{Sum, mean};
+use rayon::prelude::*;
+
+pub use super::phase::phase;
+use super::{AllanError, Deviation, moving, squares};
+use crate::numerics::reduce::Sum;
 
 /// A variance (square of the deviation, SI²) and how many differences it is the mean of.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     pub variance: f64,
     pub terms: u64,
-}
-
-/// Phase of rate samples without their mean: `θ_0 = 0, θ_k = dt Σ_{j<k} (y_j − ȳ)`, n + 1 values in unit·s.
-///
-/// No member of the family sees the mean; without it the phase stays small and the differences keep their digits.
-pub fn phase(rate: &[f64], dt: f64) -> Vec<f64> {
-    let level = mean(rate);
-    let mut sum = Sum::default();
-    let mut phase = Vec::with_capacity(rate.len() + 1);
-    phase.push(0.0);
-    for y in rate {
-        sum.add(y - level);
-        phase.push(sum.value() * dt);
-    }
-    phase
 }
 
 /// Rate samples that one difference at averaging factor `m` needs.
@@ -65,43 +53,60 @@ pub fn terms(deviation: Deviation, samples: usize, m: u64) -> u64 {
     }
 }
 
-/// The variance at averaging factor `m` from phase (n + 1 values, unit·s) with sample period `dt` (s).
+/// The variance at averaging factor `m` from phase (n + 1 values, unit·s) with sample period `dt` (s); see [`variances`].
+pub fn variance(deviation: Deviation, phase: &[f64], dt: f64, m: u64) -> Result<Estimate, AllanError> {
+    let mut estimates = variances(deviation, phase, dt, &[m])?;
+    estimates.pop().ok_or(AllanError::TooShort { samples: 0, needed: 1 })
+}
+
+/// The variances at several averaging factors, in one walk over the phase where they overlap.
 ///
 /// * ADEV, overlapping ADEV: `⟨(x_{k+2m} − 2x_{k+m} + x_k)²⟩ / (2 tau²)`, k in steps of m or of 1
 /// * MDEV: the same of phase averaged over m points, `⟨(Σ_{i=j}^{j+m−1} x_{i+2m} − 2x_{i+m} + x_i)²⟩ / (2 m² tau²)`
 /// * HDEV, overlapping HDEV: `⟨(x_{k+3m} − 3x_{k+2m} + 3x_{k+m} − x_k)²⟩ / (6 tau²)`
 /// * TOTDEV: second differences centred on every inner point, phase continued at both ends by odd reflection
 ///
-/// Fails with [`AllanError::TooShort`] when not even one difference fits.
-pub fn variance(deviation: Deviation, phase: &[f64], dt: f64, m: u64) -> Result<Estimate, AllanError> {
+/// Each value is the same to the bit whichever other factors are asked for. Fails with [`AllanError::TooShort`] when at one of them not even one
+/// difference fits.
+pub fn variances(deviation: Deviation, phase: &[f64], dt: f64, factors: &[u64]) -> Result<Vec<Estimate>, AllanError> {
     let samples = phase.len().saturating_sub(1);
-    let terms = terms(deviation, samples, m);
-    if terms == 0 {
-        let needed = usize::try_from(fewest_samples(deviation, m.max(1))).unwrap_or(usize::MAX);
+    let counts: Vec<u64> = factors.iter().map(|m| terms(deviation, samples, *m)).collect();
+    if let Some(at) = counts.iter().position(|count| *count == 0) {
+        let needed = usize::try_from(fewest_samples(deviation, factors[at].max(1))).unwrap_or(usize::MAX);
         return Err(AllanError::TooShort { samples, needed });
     }
-    let (x, count, m) = (phase, terms as usize, m as usize);
-    let tau = m as f64 * dt;
+    let (x, steps) = (phase, factors.iter().map(|m| *m as usize).collect::<Vec<usize>>());
+    // without overlap, and at the ends, one factor is one loop
+    let each = |sum: &(dyn Fn(usize, usize) -> f64 + Sync)| -> Vec<f64> {
+        steps.par_iter().zip(&counts).map(|(m, count)| sum(*m, *count as usize)).collect()
+    };
     let squares = match deviation {
-        Deviation::Adev => sum_of_squares(count, |k| second(x, k * m, m)),
-        Deviation::Oadev => sum_of_squares(count, |k| second(x, k, m)),
-        Deviation::Hdev => sum_of_squares(count, |k| third(x, k * m, m)),
-        Deviation::Ohdev => sum_of_squares(count, |k| third(x, k, m)),
-        Deviation::Mdev => sum_of_squares_of_moving_sums(x, count, m),
+        Deviation::Adev => each(&|m, count| sum_of_squares(count, |k| second(x, k * m, m))),
+        Deviation::Hdev => each(&|m, count| sum_of_squares(count, |k| third(x, k * m, m))),
+        Deviation::Mdev => each(&|m, count| moving::sum_of_squares(x, count, m)),
+        Deviation::Oadev => squares::of_second_differences(x, &steps),
+        Deviation::Ohdev => squares::of_third_differences(x, &steps),
         Deviation::Totdev => {
-            let at = |i: usize| reflected(x, i as isize + 1 - m as isize);
-            sum_of_squares(count, |k| (at(k + 2 * m) - at(k + m)) - (at(k + m) - at(k)))
+            let ends = each(&|m, _| at_the_ends(x, m));
+            let inside = squares::of_second_differences(x, &steps);
+            inside.iter().zip(ends).map(|(inside, ends)| inside + ends).collect()
         }
     };
-    let norm = match deviation {
-        Deviation::Adev | Deviation::Oadev | Deviation::Totdev => 2.0 * tau * tau,
-        Deviation::Mdev => 2.0 * (m as f64 * tau).powi(2),
-        Deviation::Hdev | Deviation::Ohdev => 6.0 * tau * tau,
+    let norm = |m: u64| {
+        let tau = m as f64 * dt;
+        match deviation {
+            Deviation::Adev | Deviation::Oadev | Deviation::Totdev => 2.0 * tau * tau,
+            Deviation::Mdev => 2.0 * (m as f64 * tau).powi(2),
+            Deviation::Hdev | Deviation::Ohdev => 6.0 * tau * tau,
+        }
     };
-    Ok(Estimate { variance: squares / (norm * terms as f64), terms })
+    let estimates = factors.iter().zip(counts).zip(squares);
+    Ok(estimates
+        .map(|((m, terms), squares)| Estimate { variance: squares / (norm(*m) * terms as f64), terms })
+        .collect())
 }
 
-fn second(x: &[f64], k: usize, m: usize) -> f64 {
+pub(super) fn second(x: &[f64], k: usize, m: usize) -> f64 {
     (x[k + 2 * m] - x[k + m]) - (x[k + m] - x[k])
 }
 
@@ -121,21 +126,15 @@ fn reflected(x: &[f64], i: isize) -> f64 {
     }
 }
 
-/// Σ (Σ_{i=j}^{j+m−1} z_i)² over j, z the second differences; the inner sum is moved along, not recomputed.
-fn sum_of_squares_of_moving_sums(x: &[f64], count: usize, m: usize) -> f64 {
-    let mut moving = Sum::default();
-    for i in 0..m {
-        moving.add(second(x, i, m));
-    }
-    let mut total = Sum::default();
-    for j in 0..count {
-        total.add(moving.value().powi(2));
-        if j + 1 < count {
-            moving.add(second(x, j + m, m));
-            moving.add(-second(x, j, m));
-        }
-    }
-    total.value()
+/// Σ of the squares of the second differences of the reflected phase that reach over an end of it: centres 1 … m − 1 from either.
+fn at_the_ends(x: &[f64], m: usize) -> f64 {
+    let last = x.len() as isize - 1;
+    let span = m as isize;
+    let centred = |i: isize| {
+        let middle = x[i as usize];
+        (reflected(x, i + span) - middle) - (middle - reflected(x, i - span))
+    };
+    sum_of_squares(m - 1, |k| centred(k as isize + 1)) + sum_of_squares(m - 1, |k| centred(last - 1 - k as isize))
 }
 
 /// Plain sums over short blocks, compensated over the blocks: as accurate as needed and as fast as plain.

@@ -3,7 +3,10 @@
 pub mod deviation;
 pub mod edf;
 mod lag_sum;
+mod moving;
 pub mod noise_id;
+mod phase;
+mod squares;
 pub mod tau;
 pub mod wavelet;
 
@@ -136,30 +139,35 @@ fn check(values: &[f64], kind: Deviation, extra: usize) -> Result<(), AllanError
 fn curve_of(phase: &[f64], dt: f64, kind: Deviation, grid: TauGrid) -> Result<AllanCurve, AllanError> {
     let samples = phase.len().saturating_sub(1);
     let factors = tau::averaging_factors(grid, deviation::largest_factor(kind, samples));
+    let estimates = deviation::variances(kind, phase, dt, &factors)?;
     let mut points: Vec<AllanPoint> = factors
         .par_iter()
-        .map(|&m| {
-            let estimate = deviation::variance(kind, phase, dt, m)?;
-            Ok(AllanPoint {
-                m,
-                tau_s: m as f64 * dt,
-                deviation: estimate.variance.sqrt(),
-                lower: f64::NAN,
-                upper: f64::NAN,
-                edf: f64::NAN,
-                terms: estimate.terms,
-                noise: noise_id::identify(phase, m as usize),
-            })
+        .zip(estimates)
+        .map(|(&m, estimate)| AllanPoint {
+            m,
+            tau_s: m as f64 * dt,
+            deviation: estimate.variance.sqrt(),
+            lower: f64::NAN,
+            upper: f64::NAN,
+            edf: f64::NAN,
+            terms: estimate.terms,
+            noise: noise_id::identify(phase, m as usize),
         })
-        .collect::<Result<_, AllanError>>()?;
+        .collect();
     // where too few averages are left to identify the noise, the last type that was seen is taken
     let mut last = NoiseType::Unknown;
-    for point in &mut points {
-        if point.noise != NoiseType::Unknown {
-            last = point.noise;
-        }
-        point.set_edf(edf::power_law_degrees_of_freedom(kind, samples, point.m, last));
-    }
+    let seen: Vec<NoiseType> = points
+        .iter()
+        .map(|point| {
+            if point.noise != NoiseType::Unknown {
+                last = point.noise;
+            }
+            last
+        })
+        .collect();
+    points.par_iter_mut().zip(seen).for_each(|(point, noise)| {
+        point.set_edf(edf::power_law_degrees_of_freedom(kind, samples, point.m, noise));
+    });
     Ok(AllanCurve { deviation: kind, dt, samples, points })
 }
 

@@ -1,4 +1,4 @@
-//! Equivalent degrees of freedom of the family, covariance between overlapping Allan points, chi-square intervals.
+//! Equivalent degrees of freedom of the family, chi-square intervals.
 //!
 //! Exact for any Gaussian mixture (all but TOTDEV): the estimate is the mean of J squares of a stationary difference u
 //! with mean μ and autocovariance ρ_j, so its mean and variance are known and
@@ -6,9 +6,7 @@
 //! (Satterthwaite matching; μ is not zero only with a rate ramp). Published approximations: TOTDEV (Riley 2008, NIST SP
 //! 1065, table 7), always; MDEV (Greenhall and Riley 2003) as long as only a power law is known.
 
-use nalgebra::DMatrix;
-use rayon::prelude::*;
-
+pub use super::covariance::covariance;
 use super::{Deviation, NoiseType, deviation, lag_sum};
 use crate::noise::{NoiseModel, Term};
 use crate::numerics::distribution::chi_square_quantile;
@@ -49,24 +47,6 @@ pub fn power_law_degrees_of_freedom(kind: Deviation, samples: usize, m: u64, noi
         Deviation::Totdev => total(samples, m, noise),
         _ => degrees_of_freedom(kind, samples, m, 1.0, &unit_model(noise)),
     }
-}
-
-/// Covariance matrix of the overlapping Allan *variance* estimates at several averaging factors, from `samples` rate
-/// samples of period `dt` (s), for a Gaussian mixture: with c the cross-covariance of the second differences and μ their means,
-/// `cov(σ̂²_1, σ̂²_2) = Σ_k Σ_l [2 c(l−k)² + 4 μ_1 μ_2 c(l−k)] / (4 tau_1² tau_2² M_1 M_2)`, unit⁴.
-///
-/// Rows of factors at which no difference fits are NaN. Cost: about a thousand covariances per pair, whatever the length.
-pub fn covariance(factors: &[u64], samples: usize, dt: f64, model: &NoiseModel) -> DMatrix<f64> {
-    let count = factors.len();
-    let pairs: Vec<(usize, usize)> = (0..count).flat_map(|i| (0..=i).map(move |j| (i, j))).collect();
-    let values: Vec<f64> =
-        pairs.par_iter().map(|&(i, j)| pair_covariance(factors[i], factors[j], samples, dt, model)).collect();
-    let mut matrix = DMatrix::zeros(count, count);
-    for ((i, j), value) in pairs.into_iter().zip(values) {
-        matrix[(i, j)] = value;
-        matrix[(j, i)] = value;
-    }
-    matrix
 }
 
 /// 95 % interval of a deviation: `[σ √(edf/χ²(0.975)), σ √(edf/χ²(0.025))]` (NIST SP 1065, eq. 45).
@@ -119,10 +99,6 @@ fn autocovariance(model: &NoiseModel, m: u64, lag: i64, dt: f64) -> f64 {
     random_terms(model).map(|term| term.second_difference_autocovariance(m, lag, dt)).sum()
 }
 
-fn cross_covariance(model: &NoiseModel, m1: u64, m2: u64, lag: i64, dt: f64) -> f64 {
-    random_terms(model).map(|term| term.second_difference_cross_covariance(m1, m2, lag, dt)).sum()
-}
-
 fn random_terms(model: &NoiseModel) -> impl Iterator<Item = &Term> {
     model.terms.iter().filter(|term| !matches!(term, Term::RateRamp { .. }))
 }
@@ -148,26 +124,6 @@ fn satterthwaite(terms: u64, mean: f64, kinks: &[i64], autocovariance: impl Fn(i
         return if mean == 0.0 { f64::NAN } else { f64::INFINITY };
     }
     (count * (1.0 + square / variance)).powi(2) / sum
-}
-
-fn pair_covariance(m1: u64, m2: u64, samples: usize, dt: f64, model: &NoiseModel) -> f64 {
-    let [terms1, terms2] = [m1, m2].map(|m| deviation::terms(Deviation::Oadev, samples, m) as i64);
-    if terms1 == 0 || terms2 == 0 {
-        return f64::NAN;
-    }
-    let means = mean_second_difference(model, m1, dt) * mean_second_difference(model, m2, dt);
-    let [edges1, edges2] = [m1, m2].map(|m| [0, m as i64, 2 * m as i64]);
-    let mut kinks: Vec<i64> = edges1.iter().flat_map(|e1| edges2.map(|e2| e1 - e2)).collect();
-    kinks.sort_unstable();
-    let mut weight_changes = [0, terms2 - terms1];
-    weight_changes.sort_unstable();
-    let sum = lag_sum::sum(-terms1..=terms2, &kinks, &weight_changes, |h| {
-        let pairs = (terms1.min(terms2 - h) - (-h).max(0)) as f64;
-        let c = cross_covariance(model, m1, m2, h, dt);
-        pairs * (2.0 * c * c + 4.0 * means * c)
-    });
-    let norm = |m: u64, terms: i64| 2.0 * (m as f64 * dt).powi(2) * terms as f64;
-    sum / (norm(m1, terms1) * norm(m2, terms2))
 }
 
 /// A mixture of one term of size one.

@@ -16,28 +16,36 @@ const STEP_FRACTION: i64 = 8;
 /// `kinks`: sorted lags at which `f` or a derivative may jump or have a boundary layer (they need not lie in the range);
 /// `breaks`: sorted lags at which `f` only changes its polynomial form (weights), which need no refinement.
 pub(super) fn sum(lags: RangeInclusive<i64>, kinks: &[i64], breaks: &[i64], f: impl Fn(i64) -> f64) -> f64 {
+    nodes(lags, kinks, breaks).into_iter().map(|(lag, weight)| weight * f(lag)).sum()
+}
+
+/// The lags at which [`sum`] asks for values, ascending, and the weight of each: they depend on the kinks only. None of an empty range.
+pub(super) fn nodes(lags: RangeInclusive<i64>, kinks: &[i64], breaks: &[i64]) -> Vec<(i64, f64)> {
     let (first, last) = lags.into_inner();
     let mut cuts: Vec<i64> =
         kinks.iter().chain(breaks).copied().filter(|cut| (first..last).contains(cut)).chain([last]).collect();
     cuts.sort_unstable();
-    let mut total = 0.0;
+    let mut nodes = Vec::new();
     let mut from = first;
     for to in cuts {
         if to > from {
-            total += piece(from, to, kinks, &f);
+            piece(from, to, kinks, &mut nodes);
             from = to;
         }
     }
-    total
+    nodes
 }
 
 /// One piece with no kink and no break inside.
-fn piece(from: i64, to: i64, kinks: &[i64], f: &impl Fn(i64) -> f64) -> f64 {
+fn piece(from: i64, to: i64, kinks: &[i64], nodes: &mut Vec<(i64, f64)>) {
     let below = kinks.iter().copied().rfind(|kink| *kink <= from);
     let above = kinks.iter().copied().find(|kink| *kink >= to);
-    let mut total = 0.0;
+    let mut add = |lag: i64, weight: f64| match nodes.last_mut() {
+        // a panel begins where the last one ended
+        Some((last, sum)) if *last == lag => *sum += weight,
+        _ => nodes.push((lag, weight)),
+    };
     let mut at = from;
-    let mut start = f(at);
     while at < to {
         let distance = below
             .map_or(i64::MAX, |kink| at - kink)
@@ -45,30 +53,28 @@ fn piece(from: i64, to: i64, kinks: &[i64], f: &impl Fn(i64) -> f64) -> f64 {
             .min(above.map_or(i64::MAX, |kink| (kink - at) / 2));
         let step = (distance / STEP_FRACTION).min((to - at) / 4);
         if step < 1 {
-            let end = f(at + 1);
-            total += 0.5 * (start + end);
-            start = end;
+            add(at, 0.5);
+            add(at + 1, 0.5);
             at += 1;
         } else {
-            let values = [start, f(at + step), f(at + 2 * step), f(at + 3 * step), f(at + 4 * step)];
-            total += panel(values, step as f64);
-            start = values[4];
+            let [end, inner, middle] = panel(step as f64);
+            for (i, weight) in (0..).zip([end, inner, middle, inner, end]) {
+                add(at + i * step, weight);
+            }
             at += 4 * step;
         }
     }
-    total
 }
 
-/// Integer sum (half weight at both ends) over 4 s lags of the quartic through f(0), f(s), … f(4s).
-fn panel([f0, f1, f2, f3, f4]: [f64; 5], s: f64) -> f64 {
-    // even part about the middle: c0 + c2 (u/s)² + c4 (u/s)⁴; the odd part sums to zero
-    let inner = 0.5 * (f1 + f3) - f2;
-    let outer = 0.5 * (f0 + f4) - f2;
-    let c4 = (outer - 4.0 * inner) / 12.0;
-    let c2 = inner - c4;
-    4.0 * s * f2
-        + c2 * (16.0 * s / 3.0 + 2.0 / (3.0 * s))
-        + c4 * (64.0 * s / 5.0 + 16.0 / (3.0 * s) - 2.0 / (15.0 * s * s * s))
+/// Weights of f(0), f(s) and f(2s) in the integer sum (half weight at both ends) over 4 s lags of the quartic through f(0), f(s), … f(4s).
+fn panel(s: f64) -> [f64; 3] {
+    // even part about the middle: f(2s) + c2 (u/s)² + c4 (u/s)⁴, c4 = (outer − 4 inner)/12, c2 = inner − c4, where inner and outer are
+    // (f(s) + f(3s))/2 and (f(0) + f(4s))/2 less f(2s); the odd part sums to zero
+    let squares = 16.0 * s / 3.0 + 2.0 / (3.0 * s);
+    let fourths = 64.0 * s / 5.0 + 16.0 / (3.0 * s) - 2.0 / (15.0 * s * s * s);
+    let outer = (fourths - squares) / 12.0;
+    let inner = squares - 4.0 * outer;
+    [0.5 * outer, 0.5 * inner, 4.0 * s - inner - outer]
 }
 
 #[cfg(test)]

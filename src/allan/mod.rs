@@ -1,5 +1,6 @@
 //! Allan family: deviations, tau grids, exact degrees of freedom and intervals, noise identification (floor 2).
 
+pub mod covariance;
 pub mod deviation;
 pub mod edf;
 mod lag_sum;

@@ -1,22 +1,25 @@
 //! The measured Allan points and the covariance between them for any mixture.
 //!
-//! The covariance is a quadratic form in the squared coefficients. Its parts, one matrix per pair of unit processes, cost
-//! millions of evaluations each and are kept: a fit then changes coefficients at no cost. A Gauss-Markov process between two
-//! tabulated correlation times counts as their mixture, for the weights only (the Allan variances are always exact).
+//! The covariance is a quadratic form in the squared coefficients. Its parts, one per pair of unit processes, depend on the averaging times and the
+//! length of the log only and are worked out once, for all axes of a log together: a fit then changes coefficients at no cost. A Gauss-Markov
+//! process between two tabulated correlation times counts as their mixture, for the weights only (the Allan variances are always exact).
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
 
 use nalgebra::DMatrix;
 
 use super::shape::one_coefficient;
-use crate::allan::{AllanCurve, edf};
+use crate::allan::AllanCurve;
+use crate::allan::covariance::Form;
 use crate::noise::{Kind, NoiseModel, Term};
 
 /// Correlation times shorter than this many samples are a matter of the sensor's bandwidth, not of drift.
 const SHORTEST_CORRELATION: f64 = 10.0;
 /// Correlation times are searched up to this many lengths of the log; further out a Gauss-Markov process is a random walk.
 const LONGEST_CORRELATION: f64 = 3.0;
+/// … and, where short averaging times are left out of a short log, up to this many times the shortest at least.
+const LEAST_RANGE: f64 = 128.0;
 /// Ratio of tabulated correlation times.
 const NODE_RATIO: f64 = 2.0;
 
@@ -38,27 +41,28 @@ pub(super) struct Points {
 
 #[derive(Debug)]
 struct Table {
-    factors: Vec<u64>,
     variances: Vec<f64>,
-    /// Length of the log behind them.
+    distance: Distance,
+    geometry: Arc<Geometry>,
+}
+
+/// What does not depend on the values of a log.
+#[derive(Debug)]
+struct Geometry {
+    factors: Vec<u64>,
+    /// Length of the log.
     samples: usize,
     /// s.
     dt: f64,
-    distance: Distance,
-    /// Mixed second derivatives of the covariance by the squared coefficients of two unit processes; row 0 is the whole table.
-    parts: Mutex<Parts>,
+    /// The covariance by the squared coefficients of [`Geometry::processes`], when it is first asked for.
+    form: OnceLock<Form>,
 }
 
-type Parts = BTreeMap<(Unit, Unit), Arc<DMatrix<f64>>>;
+/// Geometries in use: axes of one log that are worked on at the same time share theirs. What is found does not depend on it.
+static IN_USE: Mutex<Vec<Weak<Geometry>>> = Mutex::new(Vec::new());
 
-/// A process of which the coefficient is such that it just touches the measured curve from below.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Unit {
-    /// Any kind but Gauss-Markov.
-    Plain(Kind),
-    /// Gauss-Markov with the correlation time of this node.
-    Node(u32),
-}
+/// Kinds without a time that an Allan curve shows, in the order of the processes; Gauss-Markov processes of tabulated times follow.
+const PLAIN: [Kind; 4] = [Kind::Quantization, Kind::White, Kind::BiasInstability, Kind::RateRandomWalk];
 
 /// What the weights need.
 pub(super) struct Covariance {
@@ -73,17 +77,16 @@ impl Points {
     pub(super) fn of_curve(curve: &AllanCurve, distance: Distance) -> Points {
         let used = curve.points.iter().filter(|p| p.m as usize <= curve.samples / 3 && p.deviation > 0.0);
         let (factors, variances) = used.map(|p| (p.m, p.deviation * p.deviation)).unzip();
-        let parts = Mutex::new(BTreeMap::new());
-        let table = Table { factors, variances, samples: curve.samples, dt: curve.dt, distance, parts };
-        Points { table: Arc::new(table), skip: 0 }
+        let geometry = Geometry::shared(factors, curve.samples, curve.dt);
+        Points { table: Arc::new(Table { variances, distance, geometry }), skip: 0 }
     }
     /// The points at and above an averaging factor.
     pub(super) fn starting_at(&self, first: u64) -> Points {
-        let skip = self.table.factors.iter().take_while(|m| **m < first).count();
+        let skip = self.table.geometry.factors.iter().take_while(|m| **m < first).count();
         Points { table: Arc::clone(&self.table), skip }
     }
     pub(super) fn factors(&self) -> &[u64] {
-        &self.table.factors[self.skip..]
+        &self.table.geometry.factors[self.skip..]
     }
     pub(super) fn variances(&self) -> &[f64] {
         &self.table.variances[self.skip..]
@@ -92,10 +95,10 @@ impl Points {
         self.factors().len()
     }
     pub(super) fn samples(&self) -> usize {
-        self.table.samples
+        self.table.geometry.samples
     }
     pub(super) fn dt(&self) -> f64 {
-        self.table.dt
+        self.table.geometry.dt
     }
     pub(super) fn distance(&self) -> Distance {
         self.table.distance
@@ -114,44 +117,38 @@ impl Points {
 
     /// Covariance of the points for this mixture.
     pub(super) fn covariance(&self, model: &NoiseModel) -> Covariance {
-        let table = &self.table;
+        let geometry = &self.table.geometry;
         let mut slope = 0.0;
-        let mut weights: BTreeMap<Unit, f64> = BTreeMap::new();
+        let mut weights: BTreeMap<usize, f64> = BTreeMap::new();
+        let mut add = |process: usize, weight: f64| *weights.entry(process).or_insert(0.0) += weight;
         for term in &model.terms {
             match *term {
                 Term::RateRamp { slope: s } => slope += s,
                 Term::GaussMarkov { std_dev, correlation_time } => {
-                    let place = (correlation_time / (SHORTEST_CORRELATION * table.dt)).ln().max(0.0) / NODE_RATIO.ln();
-                    let (node, above) = (place.floor() as u32, place.fract());
-                    for (node, share) in [(node, 1.0 - above), (node + 1, above)] {
-                        let unit = Unit::Node(node);
-                        let size = table.square(&table.unit_term(unit));
-                        *weights.entry(unit).or_insert(0.0) += share * std_dev * std_dev / size;
-                    }
+                    let (node, above) = geometry.node(correlation_time);
+                    add(PLAIN.len() + node, (1.0 - above) * std_dev * std_dev);
+                    add(PLAIN.len() + node + 1, above * std_dev * std_dev);
                 }
-                other => {
-                    let unit = Unit::Plain(other.kind());
-                    *weights.entry(unit).or_insert(0.0) += table.square(&other) / table.square(&table.unit_term(unit));
+                Term::Quantization { coefficient } | Term::BiasInstability { coefficient } => {
+                    add(plain(term.kind()), coefficient * coefficient);
                 }
+                Term::White { density } | Term::RateRandomWalk { density } => {
+                    add(plain(term.kind()), density * density)
+                }
+                // averages of the log do not show these apart from white noise: no fit to its Allan curve has them
+                Term::MovingAverage { .. } | Term::Oscillation { .. } => {}
             }
         }
-        weights.retain(|_, weight| *weight > 0.0);
-        let size = table.factors.len();
-        let mut matrix = DMatrix::zeros(size, size);
-        let units: Vec<(Unit, f64)> = weights.into_iter().collect();
-        for (i, (a, weight_a)) in units.iter().enumerate() {
-            for (b, weight_b) in &units[..=i] {
-                matrix += (weight_a * weight_b) * &*table.part(*b, *a);
-            }
-            if slope != 0.0 {
-                let ramp = Unit::Plain(Kind::RateRamp);
-                matrix += (weight_a * slope * slope / table.square(&table.unit_term(ramp))) * &*table.part(*a, ramp);
-            }
-        }
-        let mixture: Vec<(Term, f64)> = units.iter().map(|(unit, weight)| (table.unit_term(*unit), *weight)).collect();
+        let weights: Vec<(usize, f64)> = weights.into_iter().filter(|(_, weight)| *weight > 0.0).collect();
+        let processes = geometry.processes();
+        let form = geometry
+            .form
+            .get_or_init(|| Form::new(&geometry.factors, geometry.samples, geometry.dt, processes.clone()));
+        let matrix = form.covariance(&weights, slope);
         let variance = |m: &u64| {
-            let noise: f64 = mixture.iter().map(|(term, weight)| weight * term.allan_variance(*m, table.dt)).sum();
-            noise + Term::RateRamp { slope }.allan_variance(*m, table.dt)
+            let unit = |process: usize| processes[process].allan_variance(*m, geometry.dt);
+            let noise: f64 = weights.iter().map(|(process, weight)| weight * unit(*process)).sum();
+            noise + Term::RateRamp { slope }.allan_variance(*m, geometry.dt)
         };
         let count = self.len();
         Covariance {
@@ -161,61 +158,52 @@ impl Points {
     }
 }
 
-impl Table {
-    /// The squared coefficient.
-    fn square(&self, term: &Term) -> f64 {
-        let coefficient = match *term {
-            Term::Quantization { coefficient } | Term::BiasInstability { coefficient } => coefficient,
-            Term::White { density } | Term::MovingAverage { density, .. } | Term::RateRandomWalk { density } => density,
-            Term::GaussMarkov { std_dev, .. } | Term::Oscillation { std_dev, .. } => std_dev,
-            Term::RateRamp { slope } => slope,
-        };
-        coefficient * coefficient
-    }
+/// The number of the process of a kind of [`PLAIN`].
+fn plain(kind: Kind) -> usize {
+    PLAIN.iter().position(|own| *own == kind).unwrap_or(PLAIN.len())
+}
 
-    fn unit_term(&self, unit: Unit) -> Term {
-        let one = match unit {
-            Unit::Plain(kind) => one_coefficient(kind, 1.0),
-            Unit::Node(node) => {
-                let correlation_time = SHORTEST_CORRELATION * self.dt * NODE_RATIO.powi(node as i32);
-                Term::GaussMarkov { std_dev: 1.0, correlation_time }
-            }
-        };
-        let ratio = |(m, v): (&u64, &f64)| v / one.allan_variance(*m, self.dt);
-        let touch = self.factors.iter().zip(&self.variances).map(ratio).fold(f64::INFINITY, f64::min).sqrt();
-        match one {
-            Term::GaussMarkov { correlation_time, .. } => Term::GaussMarkov { std_dev: touch, correlation_time },
-            other => one_coefficient(other.kind(), touch),
-        }
-    }
-
-    /// The part of the covariance that two unit processes cause together (a ≤ b): by polarisation of the quadratic form.
-    fn part(&self, a: Unit, b: Unit) -> Arc<DMatrix<f64>> {
+impl Geometry {
+    fn shared(factors: Vec<u64>, samples: usize, dt: f64) -> Arc<Geometry> {
         // a thread that panicked while it held the lock cannot have left a half-made entry
-        let cached = self.parts.lock().unwrap_or_else(PoisonError::into_inner).get(&(a, b)).cloned();
-        if let Some(part) = cached {
-            return part;
+        let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
+        in_use.retain(|geometry| geometry.strong_count() > 0);
+        let same = |own: &Arc<Geometry>| own.factors == factors && own.samples == samples && own.dt == dt;
+        if let Some(found) = in_use.iter().filter_map(Weak::upgrade).find(same) {
+            return found;
         }
-        let of = |units: &[Unit]| {
-            let model = NoiseModel { terms: units.iter().map(|u| self.unit_term(*u)).collect() };
-            edf::covariance(&self.factors, self.samples, self.dt, &model)
+        let geometry = Arc::new(Geometry { factors, samples, dt, form: OnceLock::new() });
+        in_use.push(Arc::downgrade(&geometry));
+        geometry
+    }
+
+    /// The tabulated correlation time at or below this one, and how far it is to the next.
+    fn node(&self, correlation_time: f64) -> (usize, f64) {
+        let place = (correlation_time / (SHORTEST_CORRELATION * self.dt)).ln().max(0.0) / NODE_RATIO.ln();
+        let place = place.min(self.last_node() as f64);
+        (place.floor() as usize, place.fract())
+    }
+
+    /// The last tabulated correlation time but one: beyond what is searched.
+    fn last_node(&self) -> usize {
+        let longest = LONGEST_CORRELATION * self.samples as f64 / SHORTEST_CORRELATION;
+        (longest.max(LEAST_RANGE).ln() / NODE_RATIO.ln()).ceil() as usize
+    }
+
+    /// Of coefficient one.
+    fn processes(&self) -> Vec<Term> {
+        let node = |node: usize| Term::GaussMarkov {
+            std_dev: 1.0,
+            correlation_time: SHORTEST_CORRELATION * self.dt * NODE_RATIO.powi(node as i32),
         };
-        let part = match (a, b) {
-            _ if a == b => of(&[a]),
-            // a ramp is no noise: alone it has no covariance
-            (_, Unit::Plain(Kind::RateRamp)) => of(&[a, b]) - &*self.part(a, a),
-            _ => of(&[a, b]) - &*self.part(a, a) - &*self.part(b, b),
-        };
-        let part = Arc::new(part);
-        self.parts.lock().unwrap_or_else(PoisonError::into_inner).insert((a, b), Arc::clone(&part));
-        part
+        PLAIN.iter().map(|kind| one_coefficient(*kind, 1.0)).chain((0..=self.last_node() + 1).map(node)).collect()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::allan::{self, Deviation, TauGrid};
+    use crate::allan::{self, Deviation, TauGrid, edf};
 
     /// The table against the direct computation, to its quadrature error where every correlation time is a node, and to
     /// the few percent of the interpolation where none is.

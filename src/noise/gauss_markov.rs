@@ -51,10 +51,23 @@ pub(super) fn allan_variance(std_dev: f64, correlation_time: f64, m: u64, dt: f6
 
 /// Closed form in O(1); see [`Lags`].
 pub(super) fn second_difference(std_dev: f64, correlation_time: f64, m1: u64, m2: u64, h: i64, dt: f64) -> f64 {
-    // cov(z1_k, z2_{k+h}) = cov(z2_k, z1_{k−h}): keep the shorter one first
-    let (m1, m2, h) = if m1 <= m2 { (m1, m2, i128::from(h)) } else { (m2, m1, -i128::from(h)) };
     let scale = std_dev * dt;
-    scale * scale * Lags::new(dt / correlation_time, m1, m2).covariance(h)
+    let (lags, sign) = Lags::ordered(dt / correlation_time, m1, m2);
+    scale * scale * lags.covariance(sign * i128::from(h))
+}
+
+/// The same at many lags: what does not depend on the lag is worked out once.
+pub(super) fn second_differences(
+    std_dev: f64,
+    correlation_time: f64,
+    m1: u64,
+    m2: u64,
+    h: &[i64],
+    dt: f64,
+) -> Vec<f64> {
+    let scale = std_dev * dt;
+    let (lags, sign) = Lags::ordered(dt / correlation_time, m1, m2);
+    h.iter().map(|h| scale * scale * lags.covariance(sign * i128::from(*h))).collect()
 }
 
 /// Second differences of θ for σ = dt = 1.
@@ -71,18 +84,24 @@ struct Lags {
     a: f64,
     /// m1 x.
     v1: f64,
-    /// 1 − φ^{m1}.
+    /// 1 − φ^{m1} and 1 − φ^{m2}.
     q1: f64,
+    q2: f64,
     /// True: a (m1 x)² has been taken out.
     reduced: bool,
 }
 
 impl Lags {
+    /// The shorter one first: cov(z1_k, z2_{k+h}) = cov(z2_k, z1_{k−h}), so the sign of the lag may turn.
+    fn ordered(x: f64, m1: u64, m2: u64) -> (Self, i128) {
+        if m1 <= m2 { (Lags::new(x, m1, m2), 1) } else { (Lags::new(x, m2, m1), -1) }
+    }
+
     /// m1 ≤ m2.
     fn new(x: f64, m1: u64, m2: u64) -> Self {
         let v1 = m1 as f64 * x;
         let a = (-x).exp() / (-x).exp_m1().powi(2);
-        Lags { x, m1, m2, a, v1, q1: -(-v1).exp_m1(), reduced: m2 as f64 * x <= 1.0 }
+        Lags { x, m1, m2, a, v1, q1: -(-v1).exp_m1(), q2: -(-(m2 as f64) * x).exp_m1(), reduced: m2 as f64 * x <= 1.0 }
     }
 
     fn covariance(&self, h: i128) -> f64 {
@@ -90,8 +109,7 @@ impl Lags {
         let gap = (h - 2 * i128::from(self.m1)).max(-h - 2 * m2);
         if gap >= 0 {
             // the windows do not overlap: all nine lags are on one side
-            let q2 = (-(self.m2 as f64) * self.x).exp_m1();
-            return -self.a * (-(gap as f64) * self.x).exp() * (self.q1 * q2).powi(2);
+            return -self.a * (-real(gap) * self.x).exp() * (self.q1 * self.q2).powi(2);
         }
         -(self.term(h) - 2.0 * self.term(h + m2) + self.term(h + 2 * m2))
     }
@@ -101,7 +119,7 @@ impl Lags {
         let (x, a, v1, q1) = (self.x, self.a, self.v1, self.q1);
         match side(lag, self.m1) {
             Side::Clear(distance) => {
-                let u = distance as f64 * x;
+                let u = real(distance as i128) * x;
                 if self.reduced {
                     a * ((-u).exp_m1() * q1 * q1 - remainder2(v1) * (q1 + v1))
                 } else {
@@ -110,9 +128,10 @@ impl Lags {
             }
             Side::Straddles => {
                 let lags = [0, 1, 2].map(|i| (lag - i * i128::from(self.m1)).abs());
-                let absolute = lags.iter().zip(WEIGHTS).map(|(l, w)| l * w).sum::<i128>() as f64;
+                let absolute = lags.iter().zip(WEIGHTS).map(|(l, w)| l * w).sum::<i128>();
+                let absolute = real(absolute);
                 let sum = |f: fn(f64) -> f64| -> f64 {
-                    lags.iter().zip(WEIGHTS).map(|(l, w)| w as f64 * f(*l as f64 * x)).sum()
+                    lags.iter().zip(WEIGHTS).map(|(l, w)| w as f64 * f(real(*l) * x)).sum()
                 };
                 if v1 <= 1.0 {
                     // φ^|l| = 1 − u + u²/2 + remainder; the square is the part taken out, b − a x = a (sinh x − x)
@@ -127,6 +146,11 @@ impl Lags {
     }
 }
 
+/// A lag as a number; wide integers that fit a narrow one are converted as such, many times faster.
+fn real(lag: i128) -> f64 {
+    i64::try_from(lag).map_or(lag as f64, |lag| lag as f64)
+}
+
 /// e^{−u} − 1 + u.
 fn remainder2(u: f64) -> f64 {
     if u > 1.0 { (-u).exp_m1() + u } else { tail_series(u, 2) }
@@ -138,17 +162,23 @@ fn remainder3(u: f64) -> f64 {
 }
 
 /// Σ_{k ≥ first} (−u)^k/k! for 0 ≤ u ≤ 1.
-fn tail_series(u: f64, first: u32) -> f64 {
+fn tail_series(u: f64, first: usize) -> f64 {
+    /// 1/k: products are faster than quotients.
+    const RECIPROCALS: [f64; 21] = {
+        let mut reciprocals = [0.0; 21];
+        let mut k = 1;
+        while k < 21 {
+            reciprocals[k] = 1.0 / k as f64;
+            k += 1;
+        }
+        reciprocals
+    };
     // Horner from the term 1/20! down
     let mut sum = 1.0;
-    for k in (first + 1..=first + 17).rev() {
-        sum = 1.0 - u / f64::from(k) * sum;
+    for reciprocal in RECIPROCALS[first + 1..=first + 17].iter().rev() {
+        sum = 1.0 - u * reciprocal * sum;
     }
-    let mut lead = 1.0;
-    for k in 1..=first {
-        lead *= -u / f64::from(k);
-    }
-    lead * sum
+    RECIPROCALS[1..=first].iter().fold(sum, |lead, reciprocal| lead * (-u * reciprocal))
 }
 
 /// sinh x − x.

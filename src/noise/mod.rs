@@ -213,6 +213,16 @@ impl Term {
         }
     }
 
+    /// [`Term::second_difference_cross_covariance`] at each of these lags.
+    pub fn second_difference_cross_covariances(&self, m1: u64, m2: u64, lags: &[i64], dt: f64) -> Vec<f64> {
+        match *self {
+            Term::GaussMarkov { std_dev, correlation_time } => {
+                gauss_markov::second_differences(std_dev, correlation_time, m1, m2, lags, dt)
+            }
+            term => lags.iter().map(|h| term.second_difference_cross_covariance(m1, m2, *h, dt)).collect(),
+        }
+    }
+
     /// State-space form for the filter; None for white noise (it is measurement noise, variance density²/dt).
     /// `horizon_s` is used by flicker only: its Allan variance is right to 1 % up to there.
     pub fn realisation(&self, dt: f64, horizon_s: f64) -> Option<Realisation> {

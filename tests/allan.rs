@@ -10,6 +10,7 @@ mod identification;
 mod quadratic_form;
 mod recovery;
 mod wavelet;
+mod windows;
 
 use kfdesign::allan::{self, AllanError, Deviation, NoiseType, TauGrid, deviation, edf, noise_id, tau};
 use kfdesign::noise::{NoiseModel, Term};

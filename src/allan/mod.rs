@@ -7,6 +7,7 @@ mod lag_sum;
 mod moving;
 pub mod noise_id;
 mod phase;
+mod pooled;
 mod squares;
 pub mod tau;
 pub mod wavelet;
@@ -16,6 +17,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::noise::NoiseModel;
+pub use pooled::Pooled;
 
 /// Which deviation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -98,8 +100,10 @@ pub struct AllanPoint {
 pub struct AllanCurve {
     pub deviation: Deviation,
     pub dt: f64,
-    /// Samples used (the longest contiguous stretch).
+    /// Samples used (the longest contiguous stretch), or of one of several windows.
     pub samples: usize,
+    /// Windows of that many samples, of which the squares were averaged; 1 unless the log was read in windows.
+    pub windows: u64,
     pub points: Vec<AllanPoint>,
 }
 
@@ -138,38 +142,9 @@ fn check(values: &[f64], kind: Deviation, extra: usize) -> Result<(), AllanError
 }
 
 fn curve_of(phase: &[f64], dt: f64, kind: Deviation, grid: TauGrid) -> Result<AllanCurve, AllanError> {
-    let samples = phase.len().saturating_sub(1);
-    let factors = tau::averaging_factors(grid, deviation::largest_factor(kind, samples));
-    let estimates = deviation::variances(kind, phase, dt, &factors)?;
-    let mut points: Vec<AllanPoint> = factors
-        .par_iter()
-        .zip(estimates)
-        .map(|(&m, estimate)| AllanPoint {
-            m,
-            tau_s: m as f64 * dt,
-            deviation: estimate.variance.sqrt(),
-            lower: f64::NAN,
-            upper: f64::NAN,
-            edf: f64::NAN,
-            terms: estimate.terms,
-            noise: noise_id::identify(phase, m as usize),
-        })
-        .collect();
-    // where too few averages are left to identify the noise, the last type that was seen is taken
-    let mut last = NoiseType::Unknown;
-    let seen: Vec<NoiseType> = points
-        .iter()
-        .map(|point| {
-            if point.noise != NoiseType::Unknown {
-                last = point.noise;
-            }
-            last
-        })
-        .collect();
-    points.par_iter_mut().zip(seen).for_each(|(point, noise)| {
-        point.set_edf(edf::power_law_degrees_of_freedom(kind, samples, point.m, noise));
-    });
-    Ok(AllanCurve { deviation: kind, dt, samples, points })
+    let mut pooled = Pooled::new(kind, phase.len().saturating_sub(1), dt, grid);
+    pooled.add(phase)?;
+    Ok(pooled.curve())
 }
 
 impl AllanPoint {
@@ -182,11 +157,12 @@ impl AllanPoint {
 impl AllanCurve {
     /// Degrees of freedom and intervals for this noise mixture instead of the identified power laws: exact for ADEV,
     /// overlapping ADEV, HDEV and overlapping HDEV; for MDEV and TOTDEV those of the law that dominates at each tau.
+    /// Of windows they add up, as if each had its own noise.
     /// Points for which the mixture says nothing (an empty one) are left as they are.
     pub fn refine(&mut self, model: &NoiseModel) {
-        let (kind, samples, dt) = (self.deviation, self.samples, self.dt);
+        let (kind, samples, dt, windows) = (self.deviation, self.samples, self.dt, self.windows as f64);
         self.points.par_iter_mut().for_each(|point| {
-            let edf = edf::degrees_of_freedom(kind, samples, point.m, dt, model);
+            let edf = windows * edf::degrees_of_freedom(kind, samples, point.m, dt, model);
             if !edf.is_nan() {
                 point.set_edf(edf);
             }

@@ -15,7 +15,7 @@ const FEWEST_AVERAGES: usize = 30;
 /// `phase`: n + 1 points, unit·s. None with fewer than 30 averages or constant ones.
 /// Source: Riley and Greenhall 2004, "Power law noise identification using the lag 1 autocorrelation".
 pub fn exponent(phase: &[f64], m: usize) -> Option<f64> {
-    Averages::of(phase, m)?.scatter().exponent()
+    Averages::of(phase, m)?.evidence().exponent()
 }
 
 /// The type at averaging factor `m` from `phase` (n + 1 points, unit·s).
@@ -24,17 +24,60 @@ pub fn exponent(phase: &[f64], m: usize) -> Option<f64> {
 /// ramp where the mean step between averages is larger than their scatter. Unknown with fewer than 30 averages, constant
 /// ones, and beyond α = −2.
 pub fn identify(phase: &[f64], m: usize) -> NoiseType {
-    let Some(averages) = Averages::of(phase, m) else { return NoiseType::Unknown };
-    let scatter = averages.scatter();
-    if averages.is_ramp(&scatter) {
-        return NoiseType::Ramp;
+    Evidence::of(phase, m).kind()
+}
+
+/// What one log or several say about the type: the sums behind the autocorrelation, of averages without the trend of their own log.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Evidence {
+    /// Sums of squares of the averages, and of their first and second differences, all without their means.
+    squares: [f64; 1 + MOST_DIFFERENCES],
+    /// Sums of products of neighbours.
+    products: [f64; 1 + MOST_DIFFERENCES],
+    /// Steps between averages, times their mean squared.
+    ramp: f64,
+}
+
+impl Evidence {
+    /// None (all zero) with fewer than 30 averages.
+    pub(super) fn of(phase: &[f64], m: usize) -> Evidence {
+        Averages::of(phase, m).map(|averages| averages.evidence()).unwrap_or_default()
     }
-    match scatter.exponent().map(f64::round) {
-        Some(1.0 | 2.0) => NoiseType::Quantization,
-        Some(0.0) => NoiseType::White,
-        Some(-1.0) => NoiseType::Flicker,
-        Some(-2.0) => NoiseType::RandomWalk,
-        _ => NoiseType::Unknown,
+
+    pub(super) fn add(&mut self, other: &Evidence) {
+        for d in 0..=MOST_DIFFERENCES {
+            self.squares[d] += other.squares[d];
+            self.products[d] += other.products[d];
+        }
+        self.ramp += other.ramp;
+    }
+
+    pub(super) fn kind(&self) -> NoiseType {
+        // a ramp makes up most of the Allan variance when the mean step squared is above the variance of the steps
+        if self.ramp > self.squares[1] {
+            return NoiseType::Ramp;
+        }
+        match self.exponent().map(f64::round) {
+            Some(1.0 | 2.0) => NoiseType::Quantization,
+            Some(0.0) => NoiseType::White,
+            Some(-1.0) => NoiseType::Flicker,
+            Some(-2.0) => NoiseType::RandomWalk,
+            _ => NoiseType::Unknown,
+        }
+    }
+
+    fn exponent(&self) -> Option<f64> {
+        for differences in 0..=MOST_DIFFERENCES {
+            let r1 = self.products[differences] / self.squares[differences];
+            let delta = r1 / (1.0 + r1);
+            if !delta.is_finite() {
+                return None;
+            }
+            if delta < 0.25 || differences == MOST_DIFFERENCES {
+                return Some(-2.0 * (delta + differences as f64));
+            }
+        }
+        None
     }
 }
 
@@ -83,50 +126,18 @@ impl<'a> Averages<'a> {
         }
     }
 
-    fn scatter(&self) -> Scatter {
+    fn evidence(&self) -> Evidence {
         Arch::new().dispatch(Walk(self))
-    }
-
-    /// A ramp makes up most of the Allan variance when the mean step squared is above the variance of the steps.
-    fn is_ramp(&self, scatter: &Scatter) -> bool {
-        let (phase, m, steps) = (self.phase, self.m, self.count as f64 - 1.0);
-        let [first, last] = [0, self.count - 1].map(|j| phase[(j + 1) * m] - phase[j * m]);
-        let mean = (last - first) / steps;
-        mean * mean > scatter.squares[1] / steps
-    }
-}
-
-/// Of the averages without their line, and of their first and second differences, all without their means.
-struct Scatter {
-    /// Sums of squares.
-    squares: [f64; 1 + MOST_DIFFERENCES],
-    /// Sums of products of neighbours.
-    products: [f64; 1 + MOST_DIFFERENCES],
-}
-
-impl Scatter {
-    fn exponent(&self) -> Option<f64> {
-        for differences in 0..=MOST_DIFFERENCES {
-            let r1 = self.products[differences] / self.squares[differences];
-            let delta = r1 / (1.0 + r1);
-            if !delta.is_finite() {
-                return None;
-            }
-            if delta < 0.25 || differences == MOST_DIFFERENCES {
-                return Some(-2.0 * (delta + differences as f64));
-            }
-        }
-        None
     }
 }
 
 struct Walk<'a>(&'a Averages<'a>);
 
 impl WithSimd for Walk<'_> {
-    type Output = Scatter;
+    type Output = Evidence;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> Scatter {
+    fn with_simd<S: Simd>(self, _: S) -> Evidence {
         let Walk(averages) = self;
         let count = averages.count;
         // the mean of differences is known by their ends; the line took that of the averages
@@ -136,7 +147,8 @@ impl WithSimd for Walk<'_> {
         let [[first, second], [before, last]] = ends;
         let steps = count as f64 - 1.0;
         let means = [0.0, (last - first) / steps, ((last - before) - (second - first)) / (steps - 1.0)];
-        let mut scatter = Scatter { squares: [0.0; 3], products: [0.0; 3] };
+        let ramp = steps * (means[1] + averages.slope).powi(2);
+        let mut evidence = Evidence { ramp, ..Evidence::default() };
         let mut values = [0.0; BLOCK + 1 + MOST_DIFFERENCES];
         for start in (0..count).step_by(BLOCK) {
             let filled = values.len().min(count - start);
@@ -149,11 +161,11 @@ impl WithSimd for Walk<'_> {
                 }
                 let own = &mut values[..filled.saturating_sub(differences)];
                 let (squares, products) = neighbours(own, means[differences]);
-                scatter.squares[differences] += squares;
-                scatter.products[differences] += products;
+                evidence.squares[differences] += squares;
+                evidence.products[differences] += products;
             }
         }
-        scatter
+        evidence
     }
 }
 

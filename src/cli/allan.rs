@@ -1,5 +1,7 @@
 //! `kfdesign allan`.
 
+mod windows;
+
 use std::path::PathBuf;
 
 use anyhow::{Context, bail};
@@ -15,9 +17,10 @@ use super::{Status, allan_figure};
 use crate::allan::{self, AllanCurve, Deviation, NoiseType, TauGrid};
 use crate::export::atomic;
 use crate::identify::{self, Method, ModelChoice};
+use crate::input::LogOptions;
 use crate::noise::NoiseModel;
 use crate::signal::LogCheck;
-use crate::units::Quantity;
+use crate::units::{Quantity, Unit};
 
 /// Allan deviations of a log, with intervals and noise identification
 #[derive(Debug, clap::Args)]
@@ -39,8 +42,18 @@ pub struct Args {
     /// The JSON document into a file
     #[arg(short, long, value_name = "FILE.json")]
     output: Option<PathBuf>,
+    /// Read the log in windows of this length and average their squares, for logs too long for memory: 24h, 30min
+    /// [default: whole; files above 4 GiB in windows of 10 000 000 samples]
+    #[arg(long, value_name = "DURATION")]
+    window: Option<String>,
     #[command(flatten)]
     reading: LogFlags,
+}
+
+impl Args {
+    fn window(&self) -> &str {
+        self.window.as_deref().unwrap_or_default()
+    }
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -111,8 +124,11 @@ pub struct AxisDocument {
     pub name: String,
     /// Unit of deviation, lower and upper: that of the log.
     pub unit: String,
-    /// Samples used: the longest stretch without gaps and unusable samples.
+    /// Samples used: the longest stretch without gaps and unusable samples, or those of one window.
     pub samples: usize,
+    /// Windows of that many samples whose squares were averaged, where the log was read in windows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub windows: Option<u64>,
     pub tau_s: Vec<f64>,
     pub deviation: Vec<f64>,
     /// 95 % interval.
@@ -140,10 +156,22 @@ pub enum Intervals {
 
 /// One axis, SI.
 pub(super) struct AxisCurve {
-    pub(super) stretch: Stretch,
+    pub(super) name: String,
+    /// Of the rate, in the spelling of the log.
+    pub(super) unit: Unit,
+    /// What of the log was used, where it was not the whole of it in one piece.
+    pub(super) note: Option<String>,
     pub(super) curve: AllanCurve,
     /// The fitted mixture or why there is none.
     pub(super) fit: Result<NoiseModel, String>,
+}
+
+/// What is said of the log as a whole.
+struct Header {
+    name: String,
+    quantity: Quantity,
+    sample_rate_hz: f64,
+    check: LogCheck,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
@@ -151,34 +179,25 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         atomic::check_output(output, &args.log)?;
     }
     let options = args.reading.options()?;
-    let (recording, check) = crate::input::read(&args.log, &options)?;
-    print_check(&recording.name, &check);
-    let (dt, kind) = (recording.dt(), args.deviation.kind());
-    let parts = stretches(&recording, options.kind);
-    let bar = progress(parts.len() as u64, "Allan deviation");
-    let axes: Vec<AxisCurve> = parts
-        .into_par_iter()
-        .map(|part| {
-            let axis = axis_curve(part, dt, kind, args.taus);
-            bar.inc(1);
-            axis
-        })
-        .collect::<anyhow::Result<_>>()?;
-    bar.finish_and_clear();
+    let (header, axes) = match windows::axes(args, &options)? {
+        Some(found) => found,
+        None => whole(args, &options)?,
+    };
     if axes.is_empty() {
         bail!("{}: no axis to work on", args.log.display());
     }
     for axis in &axes {
         notes(axis);
     }
-    let document = document(&axes, kind, recording.quantity, recording.sample_rate_hz, check);
+    let name = header.name.clone();
+    let document = document(&axes, args.deviation.kind(), header);
     if let Some(path) = &args.output {
         let mut text = serde_json::to_string_pretty(&document)?;
         text.push('\n');
         atomic::write(path, text.as_bytes())?;
     }
     if let Some(path) = &args.plot {
-        atomic::write(path, allan_figure::sheet(&recording.name, &axes).as_bytes())?;
+        atomic::write(path, allan_figure::sheet(&name, &axes).as_bytes())?;
     }
     if args.json {
         print_json(&document)?;
@@ -187,6 +206,28 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         print_text(&text.join("\n"))?;
     }
     Ok(Status::Done)
+}
+
+/// The log in memory at once.
+fn whole(args: &Args, options: &LogOptions) -> anyhow::Result<(Header, Vec<AxisCurve>)> {
+    let (recording, check) = crate::input::read(&args.log, options)?;
+    print_check(&recording.name, &check);
+    let (dt, kind) = (recording.dt(), args.deviation.kind());
+    let parts = stretches(&recording, options.kind);
+    let header =
+        Header { name: recording.name, quantity: recording.quantity, sample_rate_hz: recording.sample_rate_hz, check };
+    drop(recording.axes);
+    let bar = progress(parts.len() as u64, "Allan deviation");
+    let axes = parts
+        .into_par_iter()
+        .map(|part| {
+            let axis = axis_curve(part, dt, kind, args.taus);
+            bar.inc(1);
+            axis
+        })
+        .collect::<anyhow::Result<_>>()?;
+    bar.finish_and_clear();
+    Ok((header, axes))
 }
 
 fn axis_curve(stretch: Stretch, dt: f64, kind: Deviation, grid: TauGrid) -> anyhow::Result<AxisCurve> {
@@ -202,16 +243,19 @@ fn axis_curve(stretch: Stretch, dt: f64, kind: Deviation, grid: TauGrid) -> anyh
     if let Ok(model) = &fit {
         curve.refine(model);
     }
-    Ok(AxisCurve { stretch, curve, fit })
+    let note = stretch.left_out_note("is used");
+    Ok(AxisCurve { name: stretch.name, unit: stretch.unit, note, curve, fit })
 }
 
 /// What a person should know about an axis beside the numbers, on stderr.
 fn notes(axis: &AxisCurve) {
-    axis.stretch.print_left_out("is used");
+    if let Some(note) = &axis.note {
+        eprintln!("  note: {}: {note}", axis.name);
+    }
     if let Err(reason) = &axis.fit {
         eprintln!(
             "  note: {}: intervals are for the power law at each tau, no mixture was fitted: {reason}",
-            axis.stretch.name
+            axis.name
         );
     }
 }
@@ -227,16 +271,17 @@ fn model_name(model: &NoiseModel) -> String {
     names.join(" + ")
 }
 
-fn document(axes: &[AxisCurve], deviation: Deviation, quantity: Quantity, rate_hz: f64, log: LogCheck) -> Document {
+fn document(axes: &[AxisCurve], deviation: Deviation, header: Header) -> Document {
     let axes = axes
         .iter()
         .map(|axis| {
             let points = &axis.curve.points;
-            let display = |si: f64| axis.stretch.unit.from_si(si);
+            let display = |si: f64| axis.unit.from_si(si);
             AxisDocument {
-                name: axis.stretch.name.clone(),
-                unit: axis.stretch.unit.text().into(),
+                name: axis.name.clone(),
+                unit: axis.unit.text().into(),
                 samples: axis.curve.samples,
+                windows: (axis.curve.windows > 1).then_some(axis.curve.windows),
                 tau_s: points.iter().map(|p| p.tau_s).collect(),
                 deviation: points.iter().map(|p| display(p.deviation)).collect(),
                 lower: points.iter().map(|p| display(p.lower)).collect(),
@@ -252,15 +297,15 @@ fn document(axes: &[AxisCurve], deviation: Deviation, quantity: Quantity, rate_h
     Document {
         format: "kfdesign-allan/1",
         deviation,
-        quantity,
-        sample_rate: SampleRate { value: rate_hz, unit: "Hz" },
+        quantity: header.quantity,
+        sample_rate: SampleRate { value: header.sample_rate_hz, unit: "Hz" },
         axes,
-        log,
+        log: header.check,
     }
 }
 
 fn text(axis: &AxisCurve, deviation: DeviationArg) -> String {
-    let (unit, points) = (&axis.stretch.unit, &axis.curve.points);
+    let (unit, points) = (&axis.unit, &axis.curve.points);
     let rows: Vec<Vec<String>> = points
         .iter()
         .map(|p| {
@@ -287,9 +332,13 @@ fn text(axis: &AxisCurve, deviation: DeviationArg) -> String {
     let lowest = lowest.map_or_else(String::new, |p| {
         format!("Lowest: {} {unit} at {} s. ", digits(unit.from_si(p.deviation)), digits(p.tau_s))
     });
+    let windows = match axis.curve.windows {
+        1 => String::new(),
+        windows => format!("{windows} windows of "),
+    };
     format!(
-        "{}: {} of {} samples\n{}{lowest}Intervals: {basis}.\n",
-        axis.stretch.name,
+        "{}: {} of {windows}{} samples\n{}{lowest}Intervals: {basis}.\n",
+        axis.name,
         deviation.kind().name(),
         axis.curve.samples,
         table(&header, &rows),

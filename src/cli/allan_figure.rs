@@ -12,6 +12,6 @@ pub(super) fn sheet(log: &str, axes: &[AxisCurve]) -> String {
 
 /// One axis.
 pub(super) fn figure(axis: &AxisCurve) -> String {
-    let AxisCurve { stretch, curve, fit } = axis;
-    report::allan::figure(&stretch.name, curve, fit.as_ref().ok(), &stretch.unit)
+    let AxisCurve { name, unit, curve, fit, .. } = axis;
+    report::allan::figure(name, curve, fit.as_ref().ok(), unit)
 }

@@ -172,6 +172,7 @@ struct CurveDocument {
 /// One axis as read and as identified.
 struct Axis {
     measured: AxisCurve,
+    part: Stretch,
     found: Identified,
     warmth: Option<temperature::Shown>,
 }
@@ -222,7 +223,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         .collect::<anyhow::Result<_>>()?;
     bar.finish_and_clear();
     let role = if args.method == MethodArg::Likelihood { "chooses the terms" } else { "is used" };
-    axes.iter().for_each(|axis| axis.measured.stretch.print_left_out(role));
+    axes.iter().for_each(|axis| axis.part.print_left_out(role));
     let params = Params {
         quantity: recording.quantity,
         sample_rate_hz: recording.sample_rate_hz,
@@ -329,8 +330,9 @@ fn identify(
         );
     }
     let part = parts.swap_remove(longest);
-    let measured = AxisCurve { stretch: part, curve: found.curve.clone(), fit: Ok(found.model.clone()) };
-    Ok(Axis { measured, found, warmth })
+    let (curve, fit) = (found.curve.clone(), Ok(found.model.clone()));
+    let measured = AxisCurve { name: part.name.clone(), unit: part.unit.clone(), note: None, curve, fit };
+    Ok(Axis { measured, part, found, warmth })
 }
 
 /// What is in the log that no model of noise has.
@@ -365,7 +367,7 @@ fn upset_words(part: &Stretch, dt: f64, robust: bool) -> Vec<String> {
 
 fn wavelets(axis: &Axis) -> WaveletDocument {
     let Axis { measured, found, .. } = axis;
-    let unit = &measured.stretch.unit;
+    let unit = &measured.unit;
     let square = |si: f64| unit.from_si(unit.from_si(si));
     let levels = wavelet::levels(&found.curve);
     let all = |of: &dyn Fn(&Level) -> f64| levels.iter().map(|level| square(of(level))).collect();
@@ -388,7 +390,7 @@ fn document<'a>(
     let axis = |axis: &'a Axis| {
         let Axis { measured, found, .. } = axis;
         let points = &found.curve.points;
-        let unit = &measured.stretch.unit;
+        let unit = &measured.unit;
         CurveDocument {
             unit: unit.text().into(),
             tau_s: points.iter().map(|p| p.tau_s).collect(),
@@ -404,8 +406,8 @@ fn document<'a>(
     };
     let axes = axes.iter().map(|a| AxisDocument {
         name: &a.found.params.name,
-        samples: a.measured.stretch.rate.len(),
-        left_out: a.measured.stretch.left_out,
+        samples: a.part.rate.len(),
+        left_out: a.part.left_out,
         first_tau_s: a.found.first_tau_s,
         fit_p_value: a.found.fit_p_value.is_finite().then_some(a.found.fit_p_value),
         candidates: &a.found.candidates,
@@ -479,8 +481,8 @@ fn text(axis: &Axis, quantity: Quantity) -> String {
 
 /// "gyro_x: white+gm, 720000 samples in 2 h".
 fn headline(axis: &Axis) -> String {
-    let Axis { measured, found, .. } = axis;
-    let samples = measured.stretch.rate.len();
+    let Axis { found, .. } = axis;
+    let samples = axis.part.rate.len();
     let span = duration(samples as f64 * found.curve.dt);
     match found.candidates.iter().find(|c| c.chosen) {
         Some(chosen) => {

@@ -47,14 +47,18 @@ impl Stretch {
 
     /// What of the log is outside the stretch, on stderr; `role`: of the stretch.
     pub(super) fn print_left_out(&self, role: &str) {
-        if self.left_out > 0 {
-            eprintln!(
-                "  note: {}: the longest stretch without gaps and unusable samples {role}: {} samples, {} left out",
-                self.name,
-                self.rate.len(),
-                self.left_out
-            );
+        if let Some(note) = self.left_out_note(role) {
+            eprintln!("  note: {}: {note}", self.name);
         }
+    }
+
+    /// The same in words, if anything is.
+    pub(super) fn left_out_note(&self, role: &str) -> Option<String> {
+        let (used, left_out) = (self.rate.len(), self.left_out);
+        let note = || {
+            format!("the longest stretch without gaps and unusable samples {role}: {used} samples, {left_out} left out")
+        };
+        (left_out > 0).then(note)
     }
 
     /// What stands beside the samples of the axis in the log: beside the stretch, and piece by piece as [`Stretch::pieces`].

@@ -17,7 +17,7 @@ use crate::params::{AxisParams, NotIdentified};
 use crate::units::{Unit, digits};
 
 /// Points of the curve per decade of averaging time; denser ones add correlation, not information.
-const POINTS_PER_DECADE: usize = 5;
+pub const POINTS_PER_DECADE: usize = 5;
 /// A model this close in score to the chosen one explains the log about as well.
 const CLOSE: f64 = 2.0 * PENALTY;
 
@@ -97,6 +97,16 @@ pub(super) fn identify(
         first_tau_s: Some(table.points.first_tau_s()),
         curve,
     })
+}
+
+/// The model that [`Method::Allan`](super::Method::Allan) would choose for a curve of overlapping Allan deviations, five a decade or so, of one log or of windows;
+/// the sign of a ramp is not in it.
+pub fn model_of_curve(name: &str, curve: &AllanCurve) -> Result<NoiseModel, IdentifyError> {
+    let table = search(&Points::of_curve(curve, Distance::CubeRoots), None);
+    let fit = table.ranked().into_iter().find(|fit| unknown(fit).is_empty()).ok_or_else(|| IdentifyError {
+        message: format!("{name}: {} samples say nothing about any noise term; use a longer log", curve.samples),
+    })?;
+    Ok(NoiseModel { terms: known_terms(fit, &[]).into_iter().map(|(term, _)| term).collect() })
 }
 
 fn candidates(table: &Table, chosen: &Fit) -> Vec<Candidate> {

@@ -42,6 +42,8 @@ pub(super) struct Points {
 #[derive(Debug)]
 struct Table {
     variances: Vec<f64>,
+    /// Windows whose variances were averaged: so much smaller is their covariance.
+    windows: f64,
     distance: Distance,
     geometry: Arc<Geometry>,
 }
@@ -78,7 +80,7 @@ impl Points {
         let used = curve.points.iter().filter(|p| p.m as usize <= curve.samples / 3 && p.deviation > 0.0);
         let (factors, variances) = used.map(|p| (p.m, p.deviation * p.deviation)).unzip();
         let geometry = Geometry::shared(factors, curve.samples, curve.dt);
-        Points { table: Arc::new(Table { variances, distance, geometry }), skip: 0 }
+        Points { table: Arc::new(Table { variances, windows: curve.windows as f64, distance, geometry }), skip: 0 }
     }
     /// The points at and above an averaging factor.
     pub(super) fn starting_at(&self, first: u64) -> Points {
@@ -94,8 +96,12 @@ impl Points {
     pub(super) fn len(&self) -> usize {
         self.factors().len()
     }
+    /// Of one window.
     pub(super) fn samples(&self) -> usize {
         self.table.geometry.samples
+    }
+    pub(super) fn windows(&self) -> f64 {
+        self.table.windows
     }
     pub(super) fn dt(&self) -> f64 {
         self.table.geometry.dt
@@ -144,7 +150,7 @@ impl Points {
         let form = geometry
             .form
             .get_or_init(|| Form::new(&geometry.factors, geometry.samples, geometry.dt, processes.clone()));
-        let matrix = form.covariance(&weights, slope);
+        let matrix = form.covariance(&weights, slope) / self.table.windows;
         let variance = |m: &u64| {
             let unit = |process: usize| processes[process].allan_variance(*m, geometry.dt);
             let noise: f64 = weights.iter().map(|(process, weight)| weight * unit(*process)).sum();

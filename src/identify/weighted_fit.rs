@@ -74,7 +74,8 @@ struct Weights {
 impl Weights {
     /// Independent points, degrees of freedom n/m − 1: good enough to start from.
     fn rough(points: &Points) -> Weights {
-        let edf = points.factors().iter().map(|m| (points.samples() as f64 / *m as f64 - 1.0).max(1.0));
+        let edf =
+            points.factors().iter().map(|m| points.windows() * (points.samples() as f64 / *m as f64 - 1.0).max(1.0));
         let (mean, sigma): (Vec<f64>, Vec<f64>) = edf.map(cube_root_moments).unzip();
         Weights {
             distance: Distance::CubeRoots,

@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use super::kalman::{Kalman, Update};
-use super::likelihood::{Stretch, log_likelihood_with_bias};
+use super::likelihood::{Stretch, log_likelihoods_with_bias};
 use crate::model::LinearModel;
 
 /// What one axis of a log says, SI; numbers that are not finite are missing.
@@ -87,7 +87,7 @@ pub fn run(model: &LinearModel, log: &SensorLog, rows: usize, mut visit: impl Fn
 /// For a sensor at rest with a constant bias the same number by the filter without that state, whose gain settles: some ten times faster.
 pub fn log_likelihood(model: &LinearModel, log: &SensorLog, rows: usize) -> f64 {
     if let Some((rest, mean, variance)) = without_bias(model).filter(|_| log.aids.is_empty()) {
-        return log_likelihood_with_bias(&rest, &log.stretches(rows), mean, variance).value;
+        return log_likelihoods_with_bias(&[rest], &log.stretches(rows), &[[mean, variance]])[0].value;
     }
     let mut sum = 0.0;
     run(model, log, rows, |_, _, update| sum += update.log_likelihood);

@@ -1,5 +1,7 @@
 //! Narrow peaks that stand out of the spectrum of a log.
 
+use rayon::prelude::*;
+
 use crate::numerics::distribution::{CHI_SQUARE_1_MEDIAN, chi_square_sf};
 
 /// Chance of taking noise for a line, over all frequencies and widths of a log.
@@ -23,30 +25,36 @@ pub fn find_lines(power: &[f64], step: f64) -> Vec<Line> {
     // below, drift has its own shapes
     const FIRST: usize = 256;
     const BAND: f64 = 0.1;
-    let mut whitened = vec![1.0; power.len()];
+    let mut bands = Vec::new();
     let mut first = FIRST;
     while first < power.len() {
         let size = ((first as f64 * BAND) as usize).max(128).min(power.len() - first);
+        bands.push((first, size));
+        first += size;
+    }
+    let level = |&(first, size): &(usize, usize)| {
         let around = first.saturating_sub(size / 2).max(FIRST / 2)..(first + size + size / 2).min(power.len());
         let mut sorted = power[around].to_vec();
         let middle = sorted.len() / 2;
         let (_, median, _) = sorted.select_nth_unstable_by(middle, f64::total_cmp);
-        let level = *median / CHI_SQUARE_1_MEDIAN;
-        for (w, p) in whitened[first..first + size].iter_mut().zip(&power[first..first + size]) {
-            *w = if level > 0.0 { p / level } else { 1.0 };
-        }
-        first += size;
-    }
+        *median / CHI_SQUARE_1_MEDIAN
+    };
+    let levels: Vec<f64> = bands.par_iter().map(level).collect();
+    // of the power over the level of its surroundings
     let mut sums = Vec::with_capacity(power.len() + 1);
     sums.push(0.0);
-    whitened.iter().fold(0.0, |sum, w| {
-        sums.push(sum + w);
-        sum + w
-    });
-    let mut peaks: Vec<(f64, usize, usize)> = Vec::new();
-    let mut size = 1;
-    while size * 8 <= power.len() - FIRST.min(power.len()) {
+    let mut sum = 0.0;
+    let mut add = |whitened: f64| {
+        sum += whitened;
+        sums.push(sum);
+    };
+    (0..FIRST.min(power.len())).for_each(|_| add(1.0));
+    for ((first, size), level) in bands.into_iter().zip(levels) {
+        power[first..first + size].iter().for_each(|p| add(if level > 0.0 { p / level } else { 1.0 }));
+    }
+    let of_size = |size: usize| {
         let tried = (power.len() / size).max(1) as f64 * 16.0;
+        let mut peaks: Vec<(f64, usize, usize)> = Vec::new();
         let mut at = FIRST.max(size * 8);
         while at + size <= power.len() {
             let sum = sums[at + size] - sums[at];
@@ -58,8 +66,12 @@ pub fn find_lines(power: &[f64], step: f64) -> Vec<Line> {
             }
             at += size.div_ceil(2);
         }
-        size *= 2;
-    }
+        peaks
+    };
+    let largest = (power.len() - FIRST.min(power.len())) / 8;
+    let sizes = std::iter::successors(Some(1), |size| Some(2 * size)).take_while(|size| *size <= largest);
+    let mut peaks: Vec<(f64, usize, usize)> =
+        sizes.collect::<Vec<usize>>().into_par_iter().flat_map_iter(of_size).collect();
     peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut found: Vec<Line> = Vec::new();
     for (_, at, size) in peaks {

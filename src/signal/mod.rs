@@ -3,6 +3,7 @@
 pub mod check;
 pub mod correlation;
 pub mod cosine;
+pub(crate) mod fourier;
 pub mod lines;
 pub mod smoothing;
 pub mod spectrum;

@@ -6,18 +6,20 @@ use rayon::prelude::*;
 use super::form::Form;
 use super::ordinates::Ordinates;
 use super::whittle::{self, Fit};
-use crate::filter::likelihood::{LogLikelihood, Stretch, diffuse_log_likelihood};
+use crate::filter::likelihood::{LogLikelihood, Stretch, diffuse_log_likelihoods};
 use crate::model::{InitialBias, LinearModel, sensor_errors};
 use crate::noise::{Kind, NoiseModel};
 use crate::units::Quantity;
 
 /// Numbers that one likelihood may cost: samples × (states² + 4 states); above, the cosine coefficients have the last word.
 const MOST_WORK: f64 = 1e8;
-/// Steps of the search at most; it ends when another would gain less than half of this in ln L.
-const STEPS: usize = 8;
-const ENOUGH: f64 = 1e-4;
-/// Step of numerical derivatives in standard deviations: the third derivative is then a thousandth of the second.
-const STEP: f64 = 0.05;
+/// Steps of the search at most; it ends when another would gain less than half of this in ln L: 3e-5 standard deviations from the maximum.
+const STEPS: usize = 12;
+const ENOUGH: f64 = 1e-9;
+/// Step of numerical derivatives in standard deviations: small enough that third derivatives of order one leave 2e-5 of a standard deviation.
+const STEP: f64 = 0.01;
+/// Rounding of ln L, relative: a sum of many terms.
+const ROUNDING: f64 = 1e-13;
 
 /// The maximum of the exact likelihood.
 #[derive(Clone, Debug)]
@@ -29,6 +31,16 @@ pub(super) struct Refined {
     pub(super) information: Option<DMatrix<f64>>,
     /// Per log.
     pub(super) biases: Vec<LogLikelihood>,
+}
+
+/// A point of the search.
+struct Place {
+    at: Vec<f64>,
+    value: f64,
+    /// Which logarithms may move, and the slopes of ln L by them.
+    free: Vec<usize>,
+    gradient: DVector<f64>,
+    biases: Vec<LogLikelihood>,
 }
 
 /// All that was recorded of one axis.
@@ -54,62 +66,80 @@ impl<'a> Exact<'a> {
         model(self.form, logs, self.data.dt, self.data.span_s())
     }
 
-    fn each(&self, logs: &[f64]) -> Option<Vec<LogLikelihood>> {
-        let model = self.model(logs)?;
+    /// Of every point, log by log; `None` where there is no such model.
+    fn each(&self, points: &[Vec<f64>]) -> Option<Vec<Vec<LogLikelihood>>> {
+        let models: Vec<LinearModel> = points.iter().map(|logs| self.model(logs)).collect::<Option<_>>()?;
         let slope = self.form.has(Kind::RateRamp);
-        Some(self.logs.par_iter().map(|log| diffuse_log_likelihood(&model, log, slope)).collect())
+        let of_log = |log: &Vec<Stretch<'_>>| diffuse_log_likelihoods(&models, log, slope);
+        let by_log: Vec<Vec<LogLikelihood>> = self.logs.par_iter().map(of_log).collect();
+        Some((0..points.len()).map(|i| by_log.iter().map(|of_points| of_points[i]).collect()).collect())
     }
 
-    fn value(&self, logs: &[f64]) -> f64 {
-        self.each(logs).map_or(f64::NAN, |each| each.iter().map(|log| log.value).sum())
+    fn values(&self, points: &[Vec<f64>]) -> Vec<f64> {
+        let sum = |logs: Vec<LogLikelihood>| logs.iter().map(|log| log.value).sum();
+        self.each(points).map_or(vec![f64::NAN; points.len()], |each| each.into_iter().map(sum).collect())
     }
 
-    /// From the maximum on the cosine coefficients, by Newton's method with their information: it is nearly that of the exact likelihood.
+    /// ln L, its slope by the logarithms that may move, and what each log says, in one go through the logs.
+    fn look(&self, at: Vec<f64>, bounds: &[(f64, f64)], sigmas: &[f64]) -> Option<Place> {
+        // what is at a bound, or of no effect, stays
+        let free: Vec<usize> = (0..at.len())
+            .filter(|i| {
+                let margin = 1.1 * STEP * sigmas[*i];
+                at[*i] > bounds[*i].0 + margin && at[*i] < bounds[*i].1 - margin
+            })
+            .collect();
+        let steps: Vec<f64> = free.iter().map(|i| STEP * sigmas[*i]).collect();
+        let sides = free.iter().zip(&steps).flat_map(|(i, step)| [*step, -step].map(|by| moved(&at, &[(*i, by)])));
+        let points: Vec<Vec<f64>> = std::iter::once(at.clone()).chain(sides).collect();
+        let each = self.each(&points)?;
+        let value = |logs: &Vec<LogLikelihood>| logs.iter().map(|log| log.value).sum::<f64>();
+        let slope = |(pair, step): (&[Vec<LogLikelihood>], &f64)| (value(&pair[0]) - value(&pair[1])) / (2.0 * step);
+        let gradient: Vec<f64> = each[1..].chunks_exact(2).zip(&steps).map(slope).collect();
+        let found = value(&each[0]);
+        (found.is_finite() && gradient.iter().all(|g| g.is_finite())).then(|| Place {
+            value: found,
+            biases: each[0].clone(),
+            gradient: DVector::from_vec(gradient),
+            free,
+            at,
+        })
+    }
+
+    /// From the maximum on the cosine coefficients, by a quasi-Newton method that begins with their information: it is nearly that of the exact
+    /// likelihood, and what its slopes tell of the difference is added (BFGS: Broyden, Fletcher, Goldfarb, Shanno 1970).
     pub(super) fn refine(&self, fit: &Fit) -> Option<Refined> {
         let bounds = whittle::bounds(self.data, self.form, &fit.logs);
         let more = self.samples() as f64 / self.data.samples as f64;
-        let mut at = fit.logs.clone();
-        let mut value = self.value(&at);
+        let mut curvature = whittle::expected_information(self.data, self.form, &fit.logs) * more;
+        let sigmas: Vec<f64> = curvature.diagonal().iter().map(|v| 1.0 / v.sqrt()).collect();
+        let mut here = self.look(fit.logs.clone(), &bounds, &sigmas)?;
         for _ in 0..STEPS {
-            let information = whittle::expected_information(self.data, self.form, &at) * more;
-            // what is at a bound, or of no effect, stays
-            let free: Vec<usize> = (0..at.len())
-                .filter(|i| {
-                    let margin = STEP * 1.1 / information[(*i, *i)].sqrt();
-                    at[*i] > bounds[*i].0 + margin && at[*i] < bounds[*i].1 - margin
-                })
-                .collect();
-            let steps: Vec<f64> = free.iter().map(|i| STEP / information[(*i, *i)].sqrt()).collect();
-            let slope = |(i, step): (&usize, &f64)| {
-                let shifted = |by: f64| self.value(&moved(&at, &[(*i, by)]));
-                (shifted(*step) - shifted(-step)) / (2.0 * step)
-            };
-            let gradient: Vec<f64> = free.par_iter().zip(&steps).map(slope).collect();
-            let gradient = DVector::from_vec(gradient);
-            let part = DMatrix::from_fn(free.len(), free.len(), |i, k| information[(free[i], free[k])]);
-            let step = Cholesky::new(part)?.solve(&gradient);
-            if gradient.iter().any(|g| !g.is_finite()) {
-                return None;
-            }
-            let promised = gradient.dot(&step);
-            let tried = [1.0, 0.5, 0.25, 0.1].into_iter().find_map(|share| {
-                let shifts: Vec<(usize, f64)> = free.iter().zip(step.iter()).map(|(i, s)| (*i, share * s)).collect();
-                let mut next = moved(&at, &shifts);
-                next.iter_mut().zip(&bounds).for_each(|(v, (low, high))| *v = v.clamp(*low, *high));
-                let reached = self.value(&next);
-                (reached > value).then_some((next, reached))
-            });
-            let Some((next, reached)) = tried else { break };
-            (at, value) = (next, reached);
-            if promised < ENOUGH {
+            let free = here.free.clone();
+            let part = DMatrix::from_fn(free.len(), free.len(), |i, k| curvature[(free[i], free[k])]);
+            let step = Cholesky::new(part)?.solve(&here.gradient);
+            if here.gradient.dot(&step) < ENOUGH {
                 break;
             }
+            let next = [1.0, 0.5, 0.25, 0.1].into_iter().find_map(|share| {
+                let shifts: Vec<(usize, f64)> = free.iter().zip(step.iter()).map(|(i, s)| (*i, share * s)).collect();
+                let mut next = moved(&here.at, &shifts);
+                next.iter_mut().zip(&bounds).for_each(|(v, (low, high))| *v = v.clamp(*low, *high));
+                let place = self.look(next, &bounds, &sigmas)?;
+                (place.value > here.value - ROUNDING * here.value.abs()).then_some(place)
+            });
+            let Some(next) = next else { break };
+            if next.free == free {
+                learn(&mut curvature, &here, &next);
+            }
+            here = next;
         }
+        let Place { at, value, biases, .. } = here;
         let whole = matches!(self.logs, [log] if matches!(log[..], [Stretch { samples, .. }] if samples.len() == self.data.samples));
         Some(Refined {
             log_likelihood: value,
             information: (!whole).then(|| self.information(&at, value, more)),
-            biases: self.each(&at)?,
+            biases,
             logs: at,
         })
     }
@@ -120,22 +150,51 @@ impl<'a> Exact<'a> {
         // half a standard deviation: the curvature that an interval sees
         let step = |i: usize| 0.5 / expected[(i, i)].sqrt().clamp(0.5, 1e9);
         let pairs: Vec<(usize, usize)> = (0..at.len()).flat_map(|i| (0..=i).map(move |k| (i, k))).collect();
-        let second = |&(i, k): &(usize, usize)| {
+        let corners = |&(i, k): &(usize, usize)| -> Vec<Vec<f64>> {
             let (a, b) = (step(i), step(k));
-            if i == k {
-                let side = |by: f64| self.value(&moved(at, &[(i, by)]));
-                return (2.0 * value - side(a) - side(-a)) / (a * a);
+            match i == k {
+                true => [a, -a].map(|by| moved(at, &[(i, by)])).into(),
+                false => [(a, b), (a, -b), (-a, b), (-a, -b)].map(|(x, y)| moved(at, &[(i, x), (k, y)])).into(),
             }
-            let corner = |x: f64, y: f64| self.value(&moved(at, &[(i, x), (k, y)]));
-            -(corner(a, b) - corner(a, -b) - corner(-a, b) + corner(-a, -b)) / (4.0 * a * b)
         };
-        let found: Vec<f64> = pairs.par_iter().map(second).collect();
+        let values = self.values(&pairs.iter().flat_map(corners).collect::<Vec<_>>());
+        let mut rest = &values[..];
+        let mut take = |count: usize| {
+            let (first, later) = rest.split_at(count);
+            rest = later;
+            first
+        };
         let mut information = DMatrix::zeros(at.len(), at.len());
-        for ((i, k), v) in pairs.into_iter().zip(found) {
-            information[(i, k)] = v;
-            information[(k, i)] = v;
+        for (i, k) in pairs {
+            let (a, b) = (step(i), step(k));
+            let second = match take(if i == k { 2 } else { 4 }) {
+                [above, below] => (2.0 * value - above - below) / (a * a),
+                [x, y, z, w] => -(x - y - z + w) / (4.0 * a * b),
+                _ => f64::NAN,
+            };
+            information[(i, k)] = second;
+            information[(k, i)] = second;
         }
         information
+    }
+}
+
+/// −∂² ln L as the slopes at both ends of a step have it along that step: B ← B + y yᵀ/yᵀs − B s sᵀB/sᵀB s.
+fn learn(curvature: &mut DMatrix<f64>, from: &Place, to: &Place) {
+    let free = &from.free;
+    let s = DVector::from_fn(free.len(), |i, _| to.at[free[i]] - from.at[free[i]]);
+    let y = &from.gradient - &to.gradient;
+    let part = DMatrix::from_fn(free.len(), free.len(), |i, k| curvature[(free[i], free[k])]);
+    let known = &part * &s;
+    let (seen, expected) = (y.dot(&s), known.dot(&s));
+    // far from the maximum, or among roundings, slopes tell nothing of it
+    if !(seen > 0.1 * expected && seen < 10.0 * expected) {
+        return;
+    }
+    for (i, row) in free.iter().enumerate() {
+        for (k, column) in free.iter().enumerate() {
+            curvature[(*row, *column)] += y[i] * y[k] / seen - known[i] * known[k] / expected;
+        }
     }
 }
 

@@ -65,26 +65,17 @@ pub(super) fn identify(
 ) -> Result<Identified, IdentifyError> {
     usable(name, rate)?;
     let failed = |message: String| IdentifyError { message: format!("{name}: {message}") };
-    let data = Ordinates::new(rate, dt, None);
-    let (fits, forced) = match choice {
-        ModelChoice::Auto => {
-            let visited = growth::grow(&data);
-            (visited.ranked(&data).into_iter().take(LOOKED_AT).cloned().collect::<Vec<Fit>>(), false)
-        }
-        ModelChoice::Terms(kinds) => (forms(kinds).iter().filter_map(|form| growth::fit(&data, form)).collect(), true),
-    };
-    let mut fits: Vec<(Fit, Vec<Precision>)> = fits
-        .into_par_iter()
-        .map(|fit| {
-            let known = precisions(&data, &fit);
-            (fit, known)
-        })
-        .collect();
-    fits.sort_by(|a, b| score(&a.0, &data).total_cmp(&score(&b.0, &data)));
-    if !forced && fits.iter().all(|(fit, known)| !unknown(&data, fit, known).is_empty()) {
-        fits.extend(fits.first().and_then(|best| reduced(&data, best)));
-    }
-    let held_out = held_out(rate, &data, &fits);
+    let (curve, (data, fits, held_out)) = rayon::join(
+        || allan::curve(rate, dt, Deviation::Oadev, TauGrid::Log(POINTS_PER_DECADE)),
+        || {
+            let data = Ordinates::new(rate, dt, None);
+            let (fits, thirds) = rayon::join(|| fits(&data, choice), || thirds(rate, &data));
+            let held_out = held_out(&thirds, &fits);
+            (data, fits, held_out)
+        },
+    );
+    let mut curve = curve.map_err(|e| failed(e.to_string()))?;
+    let forced = *choice != ModelChoice::Auto;
     let chosen = if forced { 0 } else { choice_of(&data, &fits, &held_out) };
     let Some((on_cosines, known)) = fits.get(chosen) else {
         let line = matches!(choice, ModelChoice::Terms(kinds) if kinds.contains(&Kind::Oscillation));
@@ -101,8 +92,6 @@ pub(super) fn identify(
     let terms = known_terms(&data, fit, known);
     let all_known = terms.len() == fit.form.pieces().len();
     let model = NoiseModel { terms: terms.iter().map(|found| found.term).collect() };
-    let mut curve =
-        allan::curve(rate, dt, Deviation::Oadev, TauGrid::Log(POINTS_PER_DECADE)).map_err(|e| failed(e.to_string()))?;
     curve.refine(&model);
     let mut not_identified = words.unknown_parameters(fit, known);
     if !forced {
@@ -152,6 +141,24 @@ pub(super) fn identify(
         first_tau_s: None,
         curve,
     })
+}
+
+/// Fits of the models that come into question, best score first, with what is known of their parameters.
+fn fits(data: &Ordinates, choice: &ModelChoice) -> Vec<(Fit, Vec<Precision>)> {
+    let fits: Vec<Fit> = match choice {
+        ModelChoice::Auto => growth::grow(data).ranked(data).into_iter().take(LOOKED_AT).cloned().collect(),
+        ModelChoice::Terms(kinds) => forms(kinds).par_iter().filter_map(|form| growth::fit(data, form)).collect(),
+    };
+    let known = |fit| {
+        let known = precisions(data, &fit);
+        (fit, known)
+    };
+    let mut fits: Vec<(Fit, Vec<Precision>)> = fits.into_par_iter().map(known).collect();
+    fits.sort_by(|a, b| score(&a.0, data).total_cmp(&score(&b.0, data)));
+    if *choice == ModelChoice::Auto && fits.iter().all(|(fit, known)| !unknown(data, fit, known).is_empty()) {
+        fits.extend(fits.first().and_then(|best| reduced(data, best)));
+    }
+    fits
 }
 
 /// A model at its best parameters, drift that is not identified included.
@@ -384,13 +391,17 @@ fn choice_of(data: &Ordinates, fits: &[(Fit, Vec<Precision>)], held_out: &[Optio
         .map_or(first, |(i, _)| i)
 }
 
-/// ln L of the last third of the log under the parameters that the first two thirds give, by candidate.
-fn held_out(rate: &[f64], data: &Ordinates, fits: &[(Fit, Vec<Precision>)]) -> Vec<Option<f64>> {
+/// The first two thirds of the log, and the last.
+fn thirds(rate: &[f64], data: &Ordinates) -> [Ordinates; 2] {
     let (early, late) = rate.split_at((rate.len() as f64 * FITTED_SHARE) as usize);
-    let [early, late] = [early, late].map(|part| Ordinates::new(part, data.dt, Some(&data.lines)));
+    [early, late].map(|part| Ordinates::new(part, data.dt, Some(&data.lines)))
+}
+
+/// ln L of the last third of the log under the parameters that the first two thirds give, by candidate.
+fn held_out([early, late]: &[Ordinates; 2], fits: &[(Fit, Vec<Precision>)]) -> Vec<Option<f64>> {
     let of = |(fit, _): &(Fit, Vec<Precision>)| {
-        let seen = whittle::climb_all(&early, &fit.form, &fit.logs)?;
-        Some(whittle::log_likelihood(&late, &fit.form, &seen.logs))
+        let seen = whittle::climb_all(early, &fit.form, &fit.logs)?;
+        Some(whittle::log_likelihood(late, &fit.form, &seen.logs))
     };
     fits.par_iter().take(HELD_OUT).map(of).collect()
 }

@@ -1,7 +1,10 @@
 //! The log as cosine coefficients, gathered in bins over which no spectrum changes much.
 
+use rayon::prelude::*;
+
 use crate::noise::Grid;
 use crate::signal::cosine::cosine_transform;
+use crate::signal::fourier::Roots;
 use crate::signal::lines::{Line, find_lines};
 
 /// Coefficients up to this number stand alone.
@@ -45,37 +48,38 @@ pub(super) struct Ordinates {
 
 impl Ordinates {
     /// `x`: consecutive samples; `lines`: as found elsewhere, or looked for.
+    ///
+    /// Coefficients of a ramp of slope 1: r_j = −√(2/n) dt cos(πj/2n)/(2 sin²(πj/2n)) for odd j, else 0 (summation by parts).
     pub(super) fn new(x: &[f64], dt: f64, lines: Option<&[Line]>) -> Ordinates {
         let n = x.len();
-        let power: Vec<f64> = cosine_transform(x).iter().map(|c| c * dt.sqrt()).collect();
+        let mut coefficients = cosine_transform(x);
+        let root = dt.sqrt();
+        coefficients.iter_mut().for_each(|c| *c *= root);
         let step = 1.0 / (2.0 * n as f64 * dt);
         let lines = match lines {
             Some(lines) => lines.to_vec(),
-            None => find_lines(&power.iter().map(|c| c * c).collect::<Vec<_>>(), step),
+            None => find_lines(&coefficients.iter().map(|c| c * c).collect::<Vec<_>>(), step),
         };
-        let ramp: Vec<f64> = {
-            let middle = (n as f64 - 1.0) / 2.0;
-            let line: Vec<f64> = (0..n).map(|k| (k as f64 - middle) * dt).collect();
-            cosine_transform(&line).iter().map(|c| c * dt.sqrt()).collect()
-        };
+        let angles = Roots::new(4 * n);
+        let scale = -root * dt * (2.0 / n as f64).sqrt();
         let bin = |(first, size): (usize, usize)| {
-            let (own, own_ramp) = (&power[first..first + size], &ramp[first..first + size]);
-            Bin {
-                frequency_hz: middle(first, size) * step,
-                count: size as f64,
-                power: own.iter().map(|c| c * c).sum(),
-                with_ramp: own.iter().zip(own_ramp).map(|(c, r)| c * r).sum(),
-                ramp: own_ramp.iter().map(|r| r * r).sum(),
+            let own = &coefficients[first..first + size];
+            let (mut with_ramp, mut ramp) = (0.0, 0.0);
+            // the numbers first + 1, …; even ones have none of a ramp
+            for (c, angle) in own.iter().skip(first % 2).step_by(2).zip(angles.walk(first + 1 + first % 2, 2)) {
+                let r = scale * angle.re / (2.0 * angle.im * angle.im);
+                with_ramp += c * r;
+                ramp += r * r;
             }
+            let power = own.iter().map(|c| c * c).sum();
+            Bin { frequency_hz: middle(first, size) * step, count: size as f64, power, with_ramp, ramp }
         };
-        let bins: Vec<Bin> = layout(power.len(), step, &lines).into_iter().map(bin).collect();
+        let bins: Vec<Bin> = layout(coefficients.len(), step, &lines).into_par_iter().map(bin).collect();
         let grid = Grid::new(bins.iter().map(|bin: &Bin| bin.frequency_hz).collect(), dt);
         Ordinates { bins, grid, lines, samples: n, dt }
     }
 
     /// What a log of so many samples would have before it is recorded: bins without power. `grid` is made of their frequencies.
-    ///
-    /// Coefficients of a ramp of slope 1: r_j = −√(2/n) dt cos(πj/2n)/(2 sin²(πj/2n)) for odd j, else 0 (summation by parts).
     pub(super) fn expected(samples: usize, dt: f64, lines: &[Line], grid: impl Fn(&[f64]) -> Grid) -> Ordinates {
         let step = 1.0 / (2.0 * samples as f64 * dt);
         let bin = |(first, size): (usize, usize)| {

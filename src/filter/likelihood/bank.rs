@@ -1,0 +1,336 @@
+//! Several filters of one shape side by side over one log: covariances until they have settled, then constant gains.
+
+use nalgebra::DMatrix;
+use pulp::{Arch, Simd, WithSimd};
+
+use super::lane::{LANES, Lane};
+use super::settled::{self, Settled, Totals, Transition};
+use crate::filter::Kalman;
+use crate::model::LinearModel;
+
+/// Samples that go through at once.
+pub(super) const BLOCK: usize = 1024;
+/// The covariance has settled when no entry moves by more than this many roundings of its diagonal in a step.
+const ROUNDINGS: f64 = 4.0 * f64::EPSILON;
+/// Steps from one look at the covariance to the next.
+const LOOK: usize = 16;
+/// A product of variances whose logarithm is due.
+const LARGE: f64 = 1e200;
+/// The log, the constant and the ramp.
+pub(super) const COLUMNS: usize = 3;
+
+/// Filters in progress. Lanes beyond the models repeat the last one.
+pub(super) struct Bank {
+    /// One per model: carries states and covariances over gaps.
+    carriers: Vec<Kalman>,
+    n: usize,
+    /// The log, the constant and, with a slope, the ramp.
+    columns: usize,
+    f: Transition,
+    q: Vec<Lane>,
+    h: Vec<Lane>,
+    r: Lane,
+    /// P(k|k−1), by rows.
+    p: Vec<Lane>,
+    /// x(k|k−1) of every column, one after the other.
+    x: Vec<Lane>,
+    settled: Option<Settled>,
+    /// ν of the constant, once it is constant.
+    steady: Option<Lane>,
+    /// Σ ν_i ν_j/S.
+    pub(super) sums: [[Lane; COLUMNS]; COLUMNS],
+    log_variance: Lane,
+    /// Of S/r, whose logarithm is still to be added.
+    product: Lane,
+    pub(super) count: u64,
+    scratch: Scratch,
+}
+
+/// Memory of a step, taken once.
+struct Scratch {
+    v: Vec<Lane>,
+    w: Vec<Lane>,
+    gain: Vec<Lane>,
+    matrix: Vec<Lane>,
+    before: Vec<Lane>,
+}
+
+/// Samples as they enter: of the log, and of the ramp.
+#[derive(Clone, Copy)]
+pub(super) struct Samples<'a> {
+    pub(super) log: &'a [f64],
+    pub(super) ramp: &'a [f64],
+}
+
+impl Samples<'_> {
+    fn part(&self, from: usize, to: usize) -> Samples<'_> {
+        Samples { log: &self.log[from..to], ramp: self.ramp.get(from..to).unwrap_or_default() }
+    }
+}
+
+impl Bank {
+    /// One to [`LANES`] models of the same number of states.
+    pub(super) fn new(models: &[LinearModel], slope: bool) -> Bank {
+        let n = models[0].x0.len();
+        let lane = |of: &dyn Fn(&LinearModel) -> f64| {
+            let last = models.len() - 1;
+            Lane(std::array::from_fn(|i| of(&models[i.min(last)])))
+        };
+        let matrix = |of: &dyn Fn(&LinearModel) -> &DMatrix<f64>| -> Vec<Lane> {
+            (0..n * n).map(|k| lane(&|m: &LinearModel| of(m)[(k / n, k % n)])).collect()
+        };
+        let f = matrix(&|m| &m.f);
+        let entry = |(k, v): (usize, &Lane)| (*v != Lane::ZERO).then_some((k / n, k % n, *v));
+        let entries: Vec<(usize, usize, Lane)> = f.iter().enumerate().filter_map(entry).collect();
+        let diagonal = entries.iter().all(|(i, j, _)| i == j).then(|| (0..n).map(|i| f[i * n + i]).collect());
+        let columns = if slope { 3 } else { 2 };
+        let mut x = vec![Lane::ZERO; columns * n];
+        (0..n).for_each(|i| x[i] = lane(&|m| m.x0[i]));
+        Bank {
+            carriers: models.iter().map(Kalman::new).collect(),
+            n,
+            columns,
+            f: Transition { entries, diagonal },
+            q: matrix(&|m| &m.q),
+            h: (0..n).map(|i| lane(&|m| m.h[(0, i)])).collect(),
+            r: lane(&|m| m.r[(0, 0)]),
+            p: matrix(&|m| &m.p0),
+            x,
+            settled: None,
+            steady: None,
+            sums: [[Lane::ZERO; COLUMNS]; COLUMNS],
+            log_variance: Lane::ZERO,
+            product: Lane::all(1.0),
+            count: 0,
+            scratch: Scratch {
+                v: vec![Lane::ZERO; n],
+                w: vec![Lane::ZERO; n],
+                gain: vec![Lane::ZERO; n],
+                matrix: vec![Lane::ZERO; n * n],
+                before: vec![Lane::ZERO; n * n],
+            },
+        }
+    }
+
+    /// Steps without a measurement; the cost grows with their logarithm.
+    pub(super) fn pause(&mut self, steps: u64) {
+        if steps == 0 {
+            return;
+        }
+        let n = self.n;
+        let last = self.carriers.len() - 1;
+        for (lane, carrier) in self.carriers.iter_mut().enumerate() {
+            // lanes beyond the models go with the last
+            let lanes = lane..if lane == last { LANES } else { lane + 1 };
+            for x in self.x.chunks_exact_mut(n) {
+                carrier.p.iter_mut().zip(&self.p).for_each(|(to, from)| *to = from.0[lane]);
+                carrier.x.iter_mut().zip(x.iter()).for_each(|(to, from)| *to = from.0[lane]);
+                carrier.predict_many(steps);
+                x.iter_mut().zip(carrier.x.iter()).for_each(|(to, from)| to.0[lanes.clone()].fill(*from));
+            }
+            // symmetric: by rows is by columns
+            self.p.iter_mut().zip(carrier.p.iter()).for_each(|(to, from)| to.0[lanes.clone()].fill(*from));
+        }
+        (self.settled, self.steady) = (None, None);
+    }
+
+    /// At most [`BLOCK`] consecutive samples; those that are not finite are predicted over.
+    pub(super) fn block(&mut self, samples: Samples<'_>) {
+        Arch::new().dispatch(Pass { bank: self, samples });
+    }
+
+    #[inline(always)]
+    fn pass(&mut self, samples: Samples<'_>) {
+        let length = samples.log.len();
+        let mut at = 0;
+        while at < length {
+            if !samples.log[at].is_finite() {
+                (self.settled, self.steady) = (None, None);
+                self.predict();
+                at += 1;
+                continue;
+            }
+            if self.settled.is_some() {
+                let end = samples.log[at..].iter().position(|z| !z.is_finite()).map_or(length, |bad| at + bad);
+                self.constant_gain(samples.part(at, end));
+                at = end;
+                continue;
+            }
+            let look = self.count.is_multiple_of(LOOK as u64);
+            if look {
+                self.scratch.before.copy_from_slice(&self.p);
+            }
+            self.update([samples.log[at], 1.0, samples.ramp.get(at).copied().unwrap_or(0.0)]);
+            self.predict();
+            // P0 may be zero
+            if look && self.count > 1 && self.is_still() {
+                self.settled = Some(Settled::new(&self.f, &self.h, &self.p, self.r));
+            }
+            at += 1;
+        }
+        self.take_logarithm();
+    }
+
+    /// K = P hᵀ/S, P ← (I − K h) P (I − K h)ᵀ + K r Kᵀ, x ← x + K ν.
+    #[inline(always)]
+    fn update(&mut self, z: [f64; COLUMNS]) {
+        let (n, h, p) = (self.n, &self.h[..], &mut self.p[..]);
+        let Scratch { v, w, gain, .. } = &mut self.scratch;
+        let mut variance = self.r;
+        for i in 0..n {
+            v[i] = dot(&p[i * n..][..n], h);
+            variance += h[i] * v[i];
+        }
+        let inverse = Lane::all(1.0) / variance;
+        (0..n).for_each(|i| gain[i] = v[i] * inverse);
+        // A = P − K vᵀ, w = A hᵀ, P = A + (K r − w) Kᵀ
+        for i in 0..n {
+            w[i] = self.r * gain[i];
+            for j in 0..n {
+                p[i * n + j] = p[i * n + j] - gain[i] * v[j];
+                w[i] = w[i] - p[i * n + j] * h[j];
+            }
+        }
+        for i in 0..n {
+            for j in 0..=i {
+                let value = p[i * n + j] + w[i] * gain[j];
+                p[i * n + j] = value;
+                p[j * n + i] = value;
+            }
+        }
+        let mut innovations = [Lane::ZERO; COLUMNS];
+        for (c, x) in self.x.chunks_exact_mut(n).enumerate() {
+            let innovation = Lane::all(z[c]) - dot(x, h);
+            x.iter_mut().zip(&gain[..]).for_each(|(x, k)| *x += *k * innovation);
+            innovations[c] = innovation;
+        }
+        for i in 0..self.columns {
+            let weighted = innovations[i] * inverse;
+            for j in 0..=i {
+                self.sums[i][j] += weighted * innovations[j];
+            }
+        }
+        self.product *= variance / self.r;
+        if !self.product.all_at_most(Lane::all(LARGE)) {
+            self.take_logarithm();
+        }
+        self.count += 1;
+    }
+
+    /// x ← F x, P ← F P Fᵀ + Q.
+    #[inline(always)]
+    fn predict(&mut self) {
+        let n = self.n;
+        let Scratch { v, matrix, .. } = &mut self.scratch;
+        if let Some(f) = &self.f.diagonal {
+            for i in 0..n {
+                self.x.chunks_exact_mut(n).for_each(|x| x[i] *= f[i]);
+                for j in 0..=i {
+                    let value = self.p[i * n + j] * f[i] * f[j] + self.q[i * n + j];
+                    self.p[i * n + j] = value;
+                    self.p[j * n + i] = value;
+                }
+            }
+            return;
+        }
+        for x in self.x.chunks_exact_mut(n) {
+            v.fill(Lane::ZERO);
+            self.f.entries.iter().for_each(|(i, j, f)| v[*i] += *f * x[*j]);
+            x.copy_from_slice(v);
+        }
+        matrix.fill(Lane::ZERO);
+        for (i, j, f) in &self.f.entries {
+            (0..n).for_each(|k| matrix[i * n + k] += *f * self.p[j * n + k]);
+        }
+        self.p.copy_from_slice(&self.q);
+        for (i, j, f) in &self.f.entries {
+            // the lower triangle, row k from column i
+            (*i..n).for_each(|k| self.p[k * n + i] += *f * matrix[k * n + j]);
+        }
+        for i in 0..n {
+            (0..i).for_each(|j| self.p[j * n + i] = self.p[i * n + j]);
+        }
+    }
+
+    /// The covariance is that of the step before, in every lane.
+    #[inline(always)]
+    fn is_still(&self) -> bool {
+        let (n, p, before) = (self.n, &self.p, &self.scratch.before);
+        let entry = |(i, j): (usize, usize)| {
+            let moved = p[i * n + j] - before[i * n + j];
+            let scale = Lane::all(ROUNDINGS * ROUNDINGS) * p[i * n + i] * p[j * n + j];
+            (moved * moved).all_at_most(scale)
+        };
+        (0..n).all(|i| (0..=i).all(|j| entry((i, j))))
+    }
+
+    /// Finite samples, after the covariance has settled.
+    #[inline(always)]
+    fn constant_gain(&mut self, samples: Samples<'_>) {
+        let Some(settled) = &mut self.settled else { return };
+        let n = self.n;
+        let moving = if self.steady.is_some() { 1 } else { self.columns };
+        let (length, before) = (samples.log.len(), self.x[n..2 * n].to_vec());
+        let Totals { products, sum } = settled::run(settled, &self.f, &self.h, moving, &mut self.x, samples);
+        let length_of_all = Lane::all(length as f64);
+        match self.steady {
+            Some(constant) => {
+                self.sums[0][0] += products[0][0] * settled.inverse;
+                self.sums[1][0] += constant * sum * settled.inverse;
+                self.sums[1][1] += length_of_all * constant * constant * settled.inverse;
+            }
+            None => {
+                for i in 0..self.columns {
+                    (0..=i).for_each(|j| self.sums[i][j] += products[i][j] * settled.inverse);
+                }
+            }
+        }
+        self.log_variance += length_of_all * settled.log_variance;
+        self.count += length as u64;
+        // a ramp never comes to rest
+        if self.steady.is_none() && self.columns == 2 && 2 * length >= BLOCK {
+            let after = &self.x[n..2 * n];
+            let largest = after.iter().fold(Lane::ZERO, |largest, x| largest.max(x.abs())) * Lane::all(ROUNDINGS);
+            if after.iter().zip(&before).all(|(a, b)| (*a - *b).abs().all_at_most(largest)) {
+                self.steady = Some(Lane::all(1.0) - dot(after, &self.h));
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn take_logarithm(&mut self) {
+        for (sum, product) in self.log_variance.0.iter_mut().zip(&mut self.product.0) {
+            *sum += product.ln();
+            *product = 1.0;
+        }
+    }
+
+    /// Σ ln S of model `lane`.
+    pub(super) fn log_variance(&self, lane: usize) -> f64 {
+        self.log_variance.0[lane] + self.count as f64 * self.r.0[lane].ln()
+    }
+}
+
+#[inline(always)]
+pub(super) fn dot(a: &[Lane], b: &[Lane]) -> Lane {
+    let mut sum = Lane::ZERO;
+    for (a, b) in a.iter().zip(b) {
+        sum += *a * *b;
+    }
+    sum
+}
+
+/// A block, compiled for the instruction set at hand; results are the same for all of them.
+struct Pass<'a> {
+    bank: &'a mut Bank,
+    samples: Samples<'a>,
+}
+
+impl WithSimd for Pass<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        self.bank.pass(self.samples);
+    }
+}

@@ -1,6 +1,7 @@
 //! A log in memory through a filter: its innovations and their likelihood.
 
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 use super::kalman::{Kalman, Update};
 use super::likelihood::{Stretch, log_likelihoods_with_bias};
@@ -83,19 +84,32 @@ pub fn run(model: &LinearModel, log: &SensorLog, rows: usize, mut visit: impl Fn
 }
 
 /// ln L of the first `rows` rows: Σ −½ (ln 2πS + ν²/S) over all updates.
-///
-/// For a sensor at rest with a constant bias the same number by the filter without that state, whose gain settles: some ten times faster.
 pub fn log_likelihood(model: &LinearModel, log: &SensorLog, rows: usize) -> f64 {
-    if let Some((rest, mean, variance)) = without_bias(model).filter(|_| log.aids.is_empty()) {
-        return log_likelihoods_with_bias(&[rest], &log.stretches(rows), &[[mean, variance]])[0].value;
-    }
-    let mut sum = 0.0;
-    run(model, log, rows, |_, _, update| sum += update.log_likelihood);
-    sum
+    log_likelihoods(std::slice::from_ref(model), log, rows)[0]
 }
 
-/// The model without its constant bias, and what is known of that before the log; `None` where it has none, or is more than a sensor at rest.
-fn without_bias(model: &LinearModel) -> Option<(LinearModel, f64, f64)> {
+/// The same of several models.
+///
+/// For a sensor at rest with a constant bias the same numbers by filters without that state, whose gains settle, eight at once: some fifty
+/// times faster.
+pub fn log_likelihoods(models: &[LinearModel], log: &SensorLog, rows: usize) -> Vec<f64> {
+    let at_rest: Option<Vec<_>> =
+        models.iter().map(|model| without_bias(model).filter(|_| log.aids.is_empty())).collect();
+    if let Some(at_rest) = at_rest {
+        let (rest, biases): (Vec<LinearModel>, Vec<[f64; 2]>) = at_rest.into_iter().unzip();
+        let found = log_likelihoods_with_bias(&rest, &log.stretches(rows), &biases);
+        return found.iter().map(|of_model| of_model.value).collect();
+    }
+    let one_by_one = |model: &LinearModel| {
+        let mut sum = 0.0;
+        run(model, log, rows, |_, _, update| sum += update.log_likelihood);
+        sum
+    };
+    models.par_iter().map(one_by_one).collect()
+}
+
+/// The model without its constant bias, and mean and variance of that before the log; `None` where it has none, or is more than a sensor at rest.
+fn without_bias(model: &LinearModel) -> Option<(LinearModel, [f64; 2])> {
     let n = model.states.len();
     let b = model.states.iter().position(|state| state.name == "bias")?;
     let alone =
@@ -106,5 +120,5 @@ fn without_bias(model: &LinearModel) -> Option<(LinearModel, f64, f64)> {
         return None;
     }
     let kept: Vec<usize> = (0..n).filter(|&i| i != b).collect();
-    Some((model.part(&kept), model.x0[b], model.p0[(b, b)]))
+    Some((model.part(&kept), [model.x0[b], model.p0[(b, b)]]))
 }

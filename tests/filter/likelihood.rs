@@ -135,7 +135,8 @@ fn step_by_step(model: &LinearModel, log: &[Stretch], slope: bool, prior: Option
     let inverse = information.clone().try_inverse().unwrap();
     let best = &inverse * &cross;
     let rest = sums[(0, 0)] - cross.dot(&best);
-    let value = count * std::f64::consts::TAU.ln() + log_variance + rest + information.determinant().ln() + variance.ln();
+    let value =
+        count * std::f64::consts::TAU.ln() + log_variance + rest + information.determinant().ln() + variance.ln();
     LogLikelihood { value: -0.5 * value, bias: mean + best[0], bias_variance: inverse[(0, 0)] }
 }
 
@@ -153,7 +154,9 @@ fn families() -> Vec<Vec<LinearModel>> {
         &|f| vec![white(f), drift(f, TIME), drift(1.0, 4.0), drift(1.0, 1.0), walk(f)],
         &|f| vec![white(f), Term::BiasInstability { coefficient: 0.1 * f }],
         &|f| vec![white(f), drift(f, TIME), line(f)],
-        &|f| vec![white(f), Term::Quantization { coefficient: 0.01 * f }, Term::MovingAverage { density: N, samples: 3 }],
+        &|f| {
+            vec![white(f), Term::Quantization { coefficient: 0.01 * f }, Term::MovingAverage { density: N, samples: 3 }]
+        },
         &|f| vec![white(f), line(f), Term::BiasInstability { coefficient: 0.1 }],
     ];
     let of = |terms| sensor_errors(Quantity::AngularRate, &NoiseModel { terms }, None, DT, 400.0).unwrap();

@@ -1,5 +1,6 @@
 //! Maximum likelihood: known truth within the Cramér-Rao bound, nothing invented, odd logs.
 
+mod exact;
 mod gaps;
 mod shared;
 mod study;

@@ -166,8 +166,7 @@ fn modes<const N: usize, const C: usize>(
     x: &mut [Lane],
     samples: Samples<'_>,
 ) -> Totals {
-    let (mut a, mut g, mut row, mut now) =
-        ([Lane::ZERO; N], [Lane::ZERO; N], [Lane::ZERO; N], [[Lane::ZERO; N]; C]);
+    let (mut a, mut g, mut row, mut now) = ([Lane::ZERO; N], [Lane::ZERO; N], [Lane::ZERO; N], [[Lane::ZERO; N]; C]);
     a.copy_from_slice(f);
     g.copy_from_slice(gain);
     row.copy_from_slice(h);
@@ -209,7 +208,11 @@ fn any(
     let n = h.len();
     let (mut products, mut sum) = ([[Lane::ZERO; COLUMNS]; COLUMNS], Lane::ZERO);
     for k in 0..samples.log.len() {
-        let z = if columns > 2 { entering::<3>(samples, k) } else { [Lane::all(samples.log[k]), Lane::all(1.0), Lane::ZERO] };
+        let z = if columns > 2 {
+            entering::<3>(samples, k)
+        } else {
+            [Lane::all(samples.log[k]), Lane::all(1.0), Lane::ZERO]
+        };
         let mut innovations = [Lane::ZERO; COLUMNS];
         for (c, x) in x.chunks_exact_mut(n).take(columns).enumerate() {
             innovations[c] = z[c] - dot(x, h);

@@ -7,7 +7,7 @@ use serde::Serialize;
 use slsqp::{Func, StopTols, minimize};
 
 use super::{Found, Log, ObjectiveError, Problem};
-use crate::filter::innovations::log_likelihood;
+use crate::filter::innovations::{log_likelihood, log_likelihoods};
 use crate::model::LinearModel;
 use crate::tune::parameters::Group;
 use crate::units::digits;
@@ -171,10 +171,31 @@ impl Search<'_> {
         self.group.free.iter().zip(shifts).map(of).sum()
     }
 
-    /// ln(L · prior), hugely negative where there is no such model.
+    /// ln(L · prior) at every point, hugely negative where there is no such model.
+    fn values(&self, points: &[Vec<f64>]) -> Vec<f64> {
+        let models: Vec<Option<Vec<LinearModel>>> = points.par_iter().map(|at| self.models(at).ok()).collect();
+        let mut sums: Vec<f64> = models.iter().map(|models| if models.is_some() { 0.0 } else { f64::NAN }).collect();
+        for log in self.problem.request.logs {
+            let rows = fitted_rows(self.problem, log);
+            let of_axis = |(place, axis): (usize, &usize)| {
+                let of_axis: Vec<LinearModel> = models.iter().flatten().map(|models| models[place].clone()).collect();
+                log_likelihoods(&of_axis, &log.axes[*axis], rows)
+            };
+            let by_axis: Vec<Vec<f64>> = self.group.axes.par_iter().enumerate().map(of_axis).collect();
+            let there = sums.iter_mut().zip(&models).filter(|(_, models)| models.is_some());
+            for (k, (sum, _)) in there.enumerate() {
+                *sum += by_axis.iter().map(|values| values[k]).sum::<f64>();
+            }
+        }
+        let finite = |(sum, at): (f64, &Vec<f64>)| {
+            let value = sum + self.of_priors(at);
+            if value.is_finite() { value } else { -f64::MAX.sqrt() }
+        };
+        sums.into_iter().zip(points).map(finite).collect()
+    }
+
     fn value(&self, shifts: &[f64]) -> f64 {
-        let value = self.of_logs(shifts).map_or(f64::NAN, |value| value + self.of_priors(shifts));
-        if value.is_finite() { value } else { -f64::MAX.sqrt() }
+        self.values(&[shifts.to_vec()])[0]
     }
 
     /// Shifts at the maximum, and standard deviations from the second differences there.
@@ -188,14 +209,10 @@ impl Search<'_> {
             let place = |x: &[f64]| -> Vec<f64> { x.iter().zip(&scale).map(|(x, s)| x * s).collect() };
             let f = |x: &[f64], slope: Option<&mut [f64]>, _: &mut ()| {
                 if let Some(slope) = slope {
-                    let side = |k: usize, step: f64| {
-                        let mut moved = x.to_vec();
-                        moved[k] += step;
-                        self.value(&place(&moved))
-                    };
-                    let slopes: Vec<f64> =
-                        (0..n).into_par_iter().map(|k| -(side(k, STEP) - side(k, -STEP)) / (2.0 * STEP)).collect();
-                    slope.copy_from_slice(&slopes);
+                    let sides = (0..n).flat_map(|k| [STEP, -STEP].map(|step| place(&shifted(x, &[(k, step)]))));
+                    let values = self.values(&sides.collect::<Vec<_>>());
+                    let of = |pair: &[f64]| -(pair[0] - pair[1]) / (2.0 * STEP);
+                    slope.iter_mut().zip(values.chunks_exact(2)).for_each(|(slope, pair)| *slope = of(pair));
                 }
                 -self.value(&place(x))
             };
@@ -220,47 +237,50 @@ impl Search<'_> {
 
     /// Standard deviation of each logarithm alone, from the curvature.
     fn scales(&self, at: &[f64], value: f64) -> Vec<f64> {
-        let scale = |k: usize| {
-            let mut step = 1e-3;
-            for _ in 0..4 {
-                let side = |by: f64| {
-                    let mut moved = at.to_vec();
-                    moved[k] += by;
-                    self.value(&moved)
-                };
-                let curvature = (2.0 * value - side(step) - side(-step)) / (step * step);
+        let mut scales = vec![1e-3; at.len()];
+        let mut open: Vec<usize> = (0..at.len()).collect();
+        for _ in 0..4 {
+            let sides = open.iter().flat_map(|k| [1.0, -1.0].map(|sign| shifted(at, &[(*k, sign * scales[*k])])));
+            let values = self.values(&sides.collect::<Vec<_>>());
+            let mut rough = Vec::new();
+            for (k, pair) in open.into_iter().zip(values.chunks_exact(2)) {
+                let step = scales[k];
+                let curvature = (2.0 * value - pair[0] - pair[1]) / (step * step);
                 let next = if curvature > 0.0 { curvature.sqrt().recip().clamp(SCALES.0, SCALES.1) } else { SCALES.1 };
-                if next / step > 0.2 && next / step < 5.0 {
-                    return next;
+                scales[k] = next;
+                if !(next / step > 0.2 && next / step < 5.0) {
+                    rough.push(k);
                 }
-                step = next;
             }
-            step
-        };
-        (0..at.len()).into_par_iter().map(scale).collect()
+            open = rough;
+        }
+        scales
     }
 
     /// Of the logarithms, from the inverse of the matrix of second differences; `None` where the maximum is flat.
     fn std_devs(&self, at: &[f64], value: f64) -> Vec<Option<f64>> {
         let n = at.len();
         let step: Vec<f64> = self.scales(at, value).iter().map(|s| 0.5 * s).collect();
-        let moved = |shifts: [(usize, f64); 2]| {
-            let mut moved = at.to_vec();
-            shifts.iter().for_each(|(k, sign)| moved[*k] += sign * step[*k]);
-            self.value(&moved)
-        };
         let pairs: Vec<(usize, usize)> = (0..n).flat_map(|i| (0..=i).map(move |k| (i, k))).collect();
-        let second = |&(i, k): &(usize, usize)| {
-            if i == k {
-                return 2.0 * value - moved([(i, 1.0), (i, 0.0)]) - moved([(i, -1.0), (i, 0.0)]);
-            }
-            let corner = |a: f64, b: f64| moved([(i, a), (k, b)]);
-            -0.25 * (corner(1.0, 1.0) - corner(1.0, -1.0) - corner(-1.0, 1.0) + corner(-1.0, -1.0))
+        let corners = |&(i, k): &(usize, usize)| {
+            let signs: &[(f64, f64)] =
+                if i == k { &[(1.0, 0.0), (-1.0, 0.0)] } else { &[(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] };
+            signs.iter().map(move |(a, b)| (i, k, *a, *b))
         };
-        let found: Vec<f64> = pairs.par_iter().map(second).collect();
+        let points =
+            pairs.iter().flat_map(corners).map(|(i, k, a, b)| shifted(at, &[(i, a * step[i]), (k, b * step[k])]));
+        let values = self.values(&points.collect::<Vec<_>>());
+        let mut rest = &values[..];
         let mut information = DMatrix::zeros(n, n);
-        for ((i, k), v) in pairs.into_iter().zip(found) {
-            (information[(i, k)], information[(k, i)]) = (v, v);
+        for (i, k) in pairs {
+            let (own, later) = rest.split_at(if i == k { 2 } else { 4 });
+            rest = later;
+            let second = match own {
+                [above, below] => 2.0 * value - above - below,
+                [x, y, z, w] => -0.25 * (x - y - z + w),
+                _ => f64::NAN,
+            };
+            (information[(i, k)], information[(k, i)]) = (second, second);
         }
         match nalgebra::Cholesky::new(information) {
             Some(factor) => {
@@ -289,4 +309,10 @@ impl Search<'_> {
             held_out: rest(after)?,
         })
     }
+}
+
+fn shifted(at: &[f64], shifts: &[(usize, f64)]) -> Vec<f64> {
+    let mut next = at.to_vec();
+    shifts.iter().for_each(|(k, by)| next[*k] += by);
+    next
 }

@@ -1,5 +1,8 @@
 //! Covariance between overlapping Allan points, for any mixture of given processes at once.
 
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -16,22 +19,30 @@ pub fn covariance(factors: &[u64], samples: usize, dt: f64, model: &NoiseModel) 
     let slope = |term: &Term| if let Term::RateRamp { slope } = term { *slope } else { 0.0 };
     let random = model.terms.iter().copied().filter(|term| !matches!(term, Term::RateRamp { .. }));
     let form = Form::new(factors, samples, dt, random.collect());
-    let all: Vec<(usize, f64)> = (0..form.processes).map(|process| (process, 1.0)).collect();
+    let all: Vec<(usize, f64)> = (0..form.processes.len()).map(|process| (process, 1.0)).collect();
     form.covariance(&all, model.terms.iter().map(slope).sum())
 }
 
 /// The covariance of the Allan variances as a quadratic form in the squares of the coefficients of some processes.
 ///
-/// c is linear in them, hence the covariance a sum over pairs of processes, whose parts are worked out once; and a part per process that a
-/// ramp brings. Rounding apart, nothing is neglected.
+/// c is linear in them, hence the covariance a sum over pairs of processes, whose parts are worked out once, when they are first asked for; and a
+/// part per process that a ramp brings. Rounding apart, nothing is neglected. Threads that ask at the same time share the work.
 #[derive(Debug)]
 pub struct Form {
-    points: usize,
-    processes: usize,
-    dt: f64,
     factors: Vec<u64>,
-    /// Pair by pair of points (i ≥ j, row by row): the part of each pair of processes (a ≥ b, row by row), then that of each with a ramp of slope 1/s.
-    parts: Vec<Vec<f64>>,
+    samples: usize,
+    dt: f64,
+    processes: Vec<Term>,
+    /// Row by row of the lower triangle.
+    pairs: Vec<Pair>,
+}
+
+/// Two points, and what each pair of processes (a ≥ b, row by row), then each process with a ramp of slope 1/s, adds to their covariance.
+#[derive(Debug)]
+struct Pair {
+    points: (usize, usize),
+    taken: AtomicBool,
+    parts: OnceLock<Vec<f64>>,
 }
 
 /// Partial sums of a product over lags.
@@ -40,40 +51,56 @@ const LANES: usize = 8;
 impl Form {
     /// Of these processes (a ramp among them counts nothing), from `samples` rate samples of period `dt` (s).
     pub fn new(factors: &[u64], samples: usize, dt: f64, processes: Vec<Term>) -> Form {
-        let points = factors.len();
-        let pairs: Vec<(usize, usize)> = (0..points).flat_map(|i| (0..=i).map(move |j| (i, j))).collect();
-        let parts = pairs.par_iter().map(|&(i, j)| pair(factors[i], factors[j], samples, dt, &processes)).collect();
-        Form { points, processes: processes.len(), dt, factors: factors.to_vec(), parts }
+        let points = (0..factors.len()).flat_map(|i| (0..=i).map(move |j| (i, j)));
+        let pair = |points| Pair { points, taken: AtomicBool::new(false), parts: OnceLock::new() };
+        Form { factors: factors.to_vec(), samples, dt, processes, pairs: points.map(pair).collect() }
+    }
+
+    fn parts(&self, (i, j): (usize, usize)) -> Vec<f64> {
+        parts(self.factors[i], self.factors[j], self.samples, self.dt, &self.processes)
+    }
+
+    fn work_out(&self) {
+        // no thread waits for another: one that waited with a claim of its own further down its stack would wait for ever
+        self.pairs.par_iter().for_each(|pair| {
+            if !pair.taken.swap(true, Ordering::Relaxed) {
+                // filled already only by the same numbers
+                let _ = pair.parts.set(self.parts(pair.points));
+            }
+        });
     }
 
     /// When the square of the coefficient of these processes is so many times what it was given as, the others are absent, and the rate has a
     /// ramp of `slope` (unit/s).
     pub fn covariance(&self, weights: &[(usize, f64)], slope: f64) -> DMatrix<f64> {
-        let mut matrix = DMatrix::zeros(self.points, self.points);
-        let mut parts = self.parts.iter();
+        if self.pairs.iter().any(|pair| pair.parts.get().is_none()) {
+            self.work_out();
+        }
         let triangle = |a: usize, b: usize| a.max(b) * (a.max(b) + 1) / 2 + a.min(b);
-        let with_ramp = triangle(self.processes, 0);
-        for i in 0..self.points {
-            for (j, parts) in (0..=i).zip(&mut parts) {
-                let means = (slope * self.factors[i] as f64 * self.dt * self.factors[j] as f64 * self.dt).powi(2);
-                let mut sum = 0.0;
-                for (at, (a, weight_a)) in weights.iter().enumerate() {
-                    for (b, weight_b) in &weights[..=at] {
-                        sum += weight_a * weight_b * parts[triangle(*a, *b)];
-                    }
-                    if slope != 0.0 {
-                        sum += means * weight_a * parts[with_ramp + a];
-                    }
+        let with_ramp = triangle(self.processes.len(), 0);
+        let mut matrix = DMatrix::zeros(self.factors.len(), self.factors.len());
+        for pair in &self.pairs {
+            // what another thread has not finished yet is done here too
+            let parts = pair.parts.get_or_init(|| self.parts(pair.points));
+            let (i, j) = pair.points;
+            let means = (slope * self.factors[i] as f64 * self.dt * self.factors[j] as f64 * self.dt).powi(2);
+            let mut sum = 0.0;
+            for (at, (a, weight_a)) in weights.iter().enumerate() {
+                for (b, weight_b) in &weights[..=at] {
+                    sum += weight_a * weight_b * parts[triangle(*a, *b)];
                 }
-                matrix[(i, j)] = sum;
-                matrix[(j, i)] = sum;
+                if slope != 0.0 {
+                    sum += means * weight_a * parts[with_ramp + a];
+                }
             }
+            matrix[(i, j)] = sum;
+            matrix[(j, i)] = sum;
         }
         matrix
     }
 }
 
-fn pair(m1: u64, m2: u64, samples: usize, dt: f64, processes: &[Term]) -> Vec<f64> {
+fn parts(m1: u64, m2: u64, samples: usize, dt: f64, processes: &[Term]) -> Vec<f64> {
     let count = processes.len();
     let [terms1, terms2] = [m1, m2].map(|m| deviation::terms(Deviation::Oadev, samples, m) as i64);
     if terms1 == 0 || terms2 == 0 {

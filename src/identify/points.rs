@@ -5,7 +5,7 @@
 //! process between two tabulated correlation times counts as their mixture, for the weights only (the Allan variances are always exact).
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 use nalgebra::DMatrix;
 
@@ -56,8 +56,8 @@ struct Geometry {
     samples: usize,
     /// s.
     dt: f64,
-    /// The covariance by the squared coefficients of [`Geometry::processes`], when it is first asked for.
-    form: OnceLock<Form>,
+    /// The covariance by the squared coefficients of [`processes`].
+    form: Form,
 }
 
 /// Geometries in use: axes of one log that are worked on at the same time share theirs. What is found does not depend on it.
@@ -146,11 +146,8 @@ impl Points {
             }
         }
         let weights: Vec<(usize, f64)> = weights.into_iter().filter(|(_, weight)| *weight > 0.0).collect();
-        let processes = geometry.processes();
-        let form = geometry
-            .form
-            .get_or_init(|| Form::new(&geometry.factors, geometry.samples, geometry.dt, processes.clone()));
-        let matrix = form.covariance(&weights, slope) / self.table.windows;
+        let processes = processes(geometry.samples, geometry.dt);
+        let matrix = geometry.form.covariance(&weights, slope) / self.table.windows;
         let variance = |m: &u64| {
             let unit = |process: usize| processes[process].allan_variance(*m, geometry.dt);
             let noise: f64 = weights.iter().map(|(process, weight)| weight * unit(*process)).sum();
@@ -178,7 +175,8 @@ impl Geometry {
         if let Some(found) = in_use.iter().filter_map(Weak::upgrade).find(same) {
             return found;
         }
-        let geometry = Arc::new(Geometry { factors, samples, dt, form: OnceLock::new() });
+        let geometry =
+            Arc::new(Geometry { form: Form::new(&factors, samples, dt, processes(samples, dt)), factors, samples, dt });
         in_use.push(Arc::downgrade(&geometry));
         geometry
     }
@@ -186,29 +184,31 @@ impl Geometry {
     /// The tabulated correlation time at or below this one, and how far it is to the next.
     fn node(&self, correlation_time: f64) -> (usize, f64) {
         let place = (correlation_time / (SHORTEST_CORRELATION * self.dt)).ln().max(0.0) / NODE_RATIO.ln();
-        let place = place.min(self.last_node() as f64);
+        let place = place.min(last_node(self.samples) as f64);
         (place.floor() as usize, place.fract())
     }
+}
 
-    /// The last tabulated correlation time but one: beyond what is searched.
-    fn last_node(&self) -> usize {
-        let longest = LONGEST_CORRELATION * self.samples as f64 / SHORTEST_CORRELATION;
-        (longest.max(LEAST_RANGE).ln() / NODE_RATIO.ln()).ceil() as usize
-    }
+/// The number of the last tabulated correlation time but one: beyond what is searched.
+fn last_node(samples: usize) -> usize {
+    let longest = LONGEST_CORRELATION * samples as f64 / SHORTEST_CORRELATION;
+    (longest.max(LEAST_RANGE).ln() / NODE_RATIO.ln()).ceil() as usize
+}
 
-    /// Of coefficient one.
-    fn processes(&self) -> Vec<Term> {
-        let node = |node: usize| Term::GaussMarkov {
-            std_dev: 1.0,
-            correlation_time: SHORTEST_CORRELATION * self.dt * NODE_RATIO.powi(node as i32),
-        };
-        PLAIN.iter().map(|kind| one_coefficient(*kind, 1.0)).chain((0..=self.last_node() + 1).map(node)).collect()
-    }
+/// Unit processes: those of [`PLAIN`], then Gauss-Markov of the tabulated correlation times, all of coefficient one.
+fn processes(samples: usize, dt: f64) -> Vec<Term> {
+    let node = |node: usize| Term::GaussMarkov {
+        std_dev: 1.0,
+        correlation_time: SHORTEST_CORRELATION * dt * NODE_RATIO.powi(node as i32),
+    };
+    PLAIN.iter().map(|kind| one_coefficient(*kind, 1.0)).chain((0..=last_node(samples) + 1).map(node)).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rayon::prelude::*;
+
     use crate::allan::{self, Deviation, TauGrid, edf};
 
     /// The table against the direct computation, to its quadrature error where every correlation time is a node, and to
@@ -242,6 +242,21 @@ mod tests {
                     assert!(error < tolerance, "factor {factor}, ({i}, {j}): {error}");
                 }
             }
+        }
+    }
+
+    /// More axes than threads, all of one geometry, each asking from within the work of another: none waits for ever, all find what one alone does.
+    #[test]
+    fn axes_share_the_work() {
+        let rate: Vec<f64> = (0..2000).map(|k| f64::from(k * 7919 % 1000) / 1000.0).collect();
+        let curve = allan::curve(&rate, 0.5, Deviation::Oadev, TauGrid::Log(3)).unwrap();
+        let model = NoiseModel { terms: vec![Term::White { density: 0.3 }, Term::RateRandomWalk { density: 0.01 }] };
+        let matrix = |_: usize| Points::of_curve(&curve, Distance::CubeRoots).covariance(&model).matrix;
+        let alone = matrix(0);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+        for _ in 0..5 {
+            let all: Vec<DMatrix<f64>> = pool.install(|| (0..8).into_par_iter().map(matrix).collect());
+            assert!(all.iter().all(|matrix| *matrix == alone));
         }
     }
 }

@@ -148,7 +148,7 @@ impl Lags {
 
 /// A lag as a number; wide integers that fit a narrow one are converted as such, many times faster.
 fn real(lag: i128) -> f64 {
-    i64::try_from(lag).map_or(lag as f64, |lag| lag as f64)
+    i64::try_from(lag).map_or_else(|_| lag as f64, |lag| lag as f64)
 }
 
 /// e^{−u} − 1 + u.
@@ -173,9 +173,10 @@ fn tail_series(u: f64, first: usize) -> f64 {
         }
         reciprocals
     };
-    // Horner from the term 1/20! down
+    // Horner from the first term that no longer counts down: below 1/20!, and of small arguments below (1/16)^9/9!
+    let terms = if u < 1.0 / 16.0 { 9 } else { 17 };
     let mut sum = 1.0;
-    for reciprocal in RECIPROCALS[first + 1..=first + 17].iter().rev() {
+    for reciprocal in RECIPROCALS[first + 1..=first + terms].iter().rev() {
         sum = 1.0 - u * reciprocal * sum;
     }
     RECIPROCALS[1..=first].iter().fold(sum, |lead, reciprocal| lead * (-u * reciprocal))

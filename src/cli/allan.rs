@@ -178,7 +178,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     for output in args.output.iter().chain(&args.plot) {
         atomic::check_output(output, &args.log)?;
     }
-    let options = args.reading.options()?;
+    let options = LogOptions { no_digest: true, ..args.reading.options()? };
     let (header, axes) = match windows::axes(args, &options)? {
         Some(found) => found,
         None => whole(args, &options)?,

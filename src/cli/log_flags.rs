@@ -67,6 +67,7 @@ impl LogFlags {
             rate_hz: self.rate,
             start_s: self.start,
             end_s: self.end,
+            no_digest: false,
             kind: match self.input {
                 InputArg::Rate => InputKind::Rate,
                 InputArg::Increments => InputKind::Increments,

@@ -60,6 +60,8 @@ pub struct LogOptions {
     pub temperature: TemperatureColumn,
     /// Columns beside the axes, of any dimension.
     pub extra: Vec<ExtraColumn>,
+    /// Leave out the SHA-256 of the file, which costs about as much as reading it; only [`read`] does.
+    pub no_digest: bool,
 }
 
 impl LogOptions {
@@ -185,7 +187,11 @@ impl Selection {
             }
             self.started = true;
         }
-        match (first..rows).find(|&i| time(i, seen + i as u64) > self.end_s) {
+        if self.end_s == f64::INFINITY {
+            return (first..rows, false);
+        }
+        let beyond = |i: &usize| time(*i, seen + *i as u64) > self.end_s;
+        match (first..rows).find(beyond) {
             Some(end) => (first..end, true),
             None => (first..rows, false),
         }
@@ -254,6 +260,7 @@ impl Log {
         if let Some((column, unit)) = &self.choice.time {
             rows.time.iter_mut().for_each(|t| *t = unit.to_si(*t));
             if self.stamped()
+                && rows.time.iter().fold(false, |empty, t| empty | !t.is_finite())
                 && let Some(empty) = rows.time.iter().position(|t| !t.is_finite())
             {
                 let heads = self.table.heads();
@@ -280,32 +287,36 @@ impl Log {
         Ok(Some(selection.take(rows.lines.len(), time)))
     }
 
-    /// The checking pass; `keep` is handed every wanted row.
-    fn scan(&mut self, mut keep: impl FnMut(&Rows, Range<usize>)) -> Result<Scan, InputError> {
+    /// The checking pass; `keep` is handed every wanted row. Rows are checked and kept while the next ones are read.
+    fn scan(&mut self, mut keep: impl FnMut(&Rows, Range<usize>) + Send) -> Result<Scan, InputError> {
         let mut period = None;
         loop {
             let axes = self.choice.axes.iter().map(|a| (a.name.as_str(), &a.unit));
             let (rate, stamped) = (self.options.rate_hz, self.choice.time.is_some());
             let mut checker = Checker::new(axes, self.choice.quantity, self.options.kind, rate, stamped, period);
             let mut selection = Selection::new(&self.options);
-            let mut rows = Rows::default();
+            let (mut rows, mut coming) = (Rows::default(), Rows::default());
             let mut first_s = 0.0;
-            while let Some((wanted, last)) = self.next(&mut selection, &mut rows)? {
+            let mut read = self.next(&mut selection, &mut rows)?;
+            while let Some((wanted, last)) = read {
                 if checker.rows() == 0 && !wanted.is_empty() {
                     let skipped = selection.seen - (rows.lines.len() - wanted.start) as u64;
                     first_s =
                         if self.stamped() { rows.time[wanted.start] } else { skipped as f64 / rate.unwrap_or(1.0) };
                     checker.set_offset(first_s);
                 }
-                if let Err(back) = checker.push(&rows.time, &rows.values, wanted.clone()) {
-                    return Err(self.backward(&back, rows.lines[back.row]));
-                }
-                if period.is_none() {
-                    keep(&rows, wanted);
-                }
-                if last {
-                    break;
-                }
+                let check = || {
+                    checker.push(&rows.time, &rows.values, wanted.clone())?;
+                    if period.is_none() {
+                        keep(&rows, wanted);
+                    }
+                    Ok(())
+                };
+                let next = || if last { Ok(None) } else { self.next(&mut selection, &mut coming) };
+                let (checked, next) = rayon::join(check, next);
+                checked.map_err(|back: BackwardStamp| self.backward(&back, rows.lines[back.row]))?;
+                read = next?;
+                std::mem::swap(&mut rows, &mut coming);
             }
             self.enough(checker.rows(), &selection)?;
             match checker.finish() {
@@ -387,9 +398,9 @@ impl LogReader {
     pub fn open(path: &Path, options: &LogOptions) -> Result<LogReader, InputError> {
         let path = &source::resolve(path)?;
         let mut log = Log::open(path, options)?;
-        let scan = log.scan(|_, _| {})?;
+        let (sha256, scan) = rayon::join(|| sha256(path), || log.scan(|_, _| {}));
+        let (scan, sha256) = (scan?, sha256?);
         log.table.rewind()?;
-        let sha256 = sha256(path)?;
         let selection = Selection::new(options);
         Ok(LogReader { log, scan, sha256, selection, rows: Rows::default(), index: 0, gap: 0, ended: false })
     }
@@ -453,11 +464,13 @@ pub fn read(path: &Path, options: &LogOptions) -> Result<(Recording, LogCheck), 
     if let (Some(rows), None, None) = (log.table.rows(), options.start_s, options.end_s) {
         values.iter_mut().for_each(|column| column.reserve_exact(rows as usize)); // the file is as long as it says
     }
-    let mut scan = log.scan(|rows, wanted| {
+    let keep = |rows: &Rows, wanted: Range<usize>| {
         for (kept, column) in values.iter_mut().zip(&rows.values) {
             kept.extend_from_slice(&column[wanted.clone()]);
         }
-    })?;
+    };
+    let (sha256, scan) = rayon::join(|| (!options.no_digest).then(|| sha256(path)).transpose(), || log.scan(keep));
+    let (mut scan, sha256) = (scan?, sha256?);
     let axis = |(info, mut values): (AxisInfo, Vec<f64>)| {
         values.shrink_to_fit();
         Axis { name: info.name, unit: info.unit, values }
@@ -476,7 +489,7 @@ pub fn read(path: &Path, options: &LogOptions) -> Result<(Recording, LogCheck), 
         axes: axes.collect(),
         gaps: scan.gaps,
         temperature,
-        sha256: Some(sha256(path)?),
+        sha256,
     };
     Ok((recording, scan.check))
 }

@@ -1,11 +1,18 @@
 //! Delimited text, plain or gzip.
 
+mod ahead;
+mod digits;
+mod fast;
+mod row;
+
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use flate2::bufread::MultiGzDecoder;
 
+use self::ahead::{Ahead, CHUNK};
+use self::row::{Fault, Form, Slot};
 use super::names::Head;
 use super::sniff::{self, Layout};
 use super::{BLOCK, InputError, Rows, Table};
@@ -14,44 +21,53 @@ use super::{BLOCK, InputError, Rows, Table};
 const LONGEST_LINE: u64 = 1 << 20;
 /// What is looked at to find the form of the log.
 const SAMPLE: usize = 1 << 18;
+/// So many rows are read line by line before chunks of lines are read ahead.
+const FIRST: usize = 256;
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
-
-/// What a column is wanted for.
-#[derive(Clone, Copy, Debug)]
-enum Slot {
-    Skip,
-    Time,
-    Axis(usize),
-    /// The same, but text is a missing value.
-    Beside(usize),
-}
 
 pub(super) struct TextTable {
     path: PathBuf,
     layout: Layout,
-    reader: Box<dyn BufRead + Send>,
-    slots: Vec<Slot>,
+    form: Form,
+    source: Source,
+    /// Lines handed out or read.
     line_number: u64,
     line: Vec<u8>,
     /// The line just read has no end: the file stops there.
     unended: bool,
-    /// First stamp of the file, whole and fraction.
-    origin: Option<(i64, f64)>,
+    /// Of a line behind rows that were handed out.
+    fault: Option<Fault>,
+    /// From the row on from which chunks are read.
+    ahead: Option<Ahead>,
+    /// Bytes of a chunk; none: line by line to the end.
+    chunk: Option<usize>,
+}
+
+/// The bytes of the log.
+struct Source {
+    reader: Box<dyn BufRead + Send>,
+    /// The most that is asked for at once: of compressed bytes always through the buffer, so that one that is damaged is read as far
+    /// whoever reads.
+    step: usize,
 }
 
 fn fail<T>(path: &Path, what: impl std::fmt::Display) -> Result<T, InputError> {
     Err(InputError { message: format!("{}: {what}", path.display()) })
 }
 
-fn open(path: &Path) -> Result<Box<dyn BufRead + Send>, InputError> {
+fn open(path: &Path) -> Result<Source, InputError> {
+    const BUFFER: usize = 1 << 18;
     let file = match File::open(path) {
         Ok(file) => file,
         Err(error) => return fail(path, format!("cannot read: {error}")),
     };
-    let mut reader = BufReader::with_capacity(1 << 18, file);
+    let mut reader = BufReader::with_capacity(BUFFER, file);
     match reader.fill_buf() {
-        Ok([0x1f, 0x8b, ..]) => Ok(Box::new(BufReader::with_capacity(1 << 18, MultiGzDecoder::new(reader)))),
-        Ok(_) => Ok(Box::new(reader)),
+        Ok([0x1f, 0x8b, ..]) => {
+            let reader = Box::new(BufReader::with_capacity(BUFFER, MultiGzDecoder::new(reader)));
+            Ok(Source { reader, step: BUFFER / 2 })
+        }
+        Ok(_) => Ok(Source { reader: Box::new(reader), step: usize::MAX }),
         Err(error) => fail(path, format!("cannot read: {error}")),
     }
 }
@@ -59,7 +75,7 @@ fn open(path: &Path) -> Result<Box<dyn BufRead + Send>, InputError> {
 impl TextTable {
     pub(super) fn open(path: &Path) -> Result<TextTable, InputError> {
         let mut sample = Vec::new();
-        if let Err(error) = open(path)?.take(SAMPLE as u64).read_to_end(&mut sample) {
+        if let Err(error) = open(path)?.reader.take(SAMPLE as u64).read_to_end(&mut sample) {
             return fail(path, format!("cannot read: {error}"));
         }
         let whole = sample.len() < SAMPLE;
@@ -75,30 +91,55 @@ impl TextTable {
             Err(why) => return fail(path, why),
         };
         let slots = vec![Slot::Skip; layout.heads.len()];
-        let reader = open(path)?;
-        let path = path.to_path_buf();
-        Ok(TextTable { path, layout, reader, slots, line_number: 0, line: Vec::new(), unended: false, origin: None })
+        let form = Form { delimiter: layout.delimiter, decimal_comma: layout.decimal_comma, slots, origin: None };
+        Ok(TextTable {
+            path: path.to_path_buf(),
+            layout,
+            form,
+            source: open(path)?,
+            line_number: 0,
+            line: Vec::new(),
+            unended: false,
+            fault: None,
+            ahead: None,
+            chunk: Some(CHUNK),
+        })
     }
 
-    fn fail<T>(&self, what: impl std::fmt::Display) -> Result<T, InputError> {
-        fail(&self.path, format!("line {}{what}", self.line_number))
+    /// What is wrong with the line.
+    fn refuse(&self, fault: Fault) -> InputError {
+        let what = match fault {
+            Fault::NoNumber { column, text } => {
+                format!(", column '{}': '{text}' is not a number", self.layout.heads[column].full)
+            }
+            Fault::Fields { count, cut } => {
+                let fields = if count == 1 { "1 field" } else { &format!("{count} fields") };
+                let wanted = self.form.slots.len();
+                let cut =
+                    if cut { " (the file ends inside this line: remove it, or stop before it with --end)" } else { "" };
+                format!(": {fields} where {wanted} are expected{cut}")
+            }
+            Fault::TooLong => " is longer than 1 MiB: this is no text log".into(),
+            Fault::Unreadable(error) => format!(": cannot read on: {error}"),
+        };
+        InputError { message: format!("{}: line {}{what}", self.path.display(), self.line_number) }
     }
 
     /// The next line without its end; false at the end of the file.
-    fn next_line(&mut self) -> Result<bool, InputError> {
+    fn next_line(&mut self) -> Result<bool, Fault> {
         self.line.clear();
         self.line_number += 1;
-        let read = (&mut self.reader).take(LONGEST_LINE).read_until(b'\n', &mut self.line);
+        let read = (&mut self.source.reader).take(LONGEST_LINE).read_until(b'\n', &mut self.line);
         match read {
             Ok(0) => return Ok(false),
             Ok(_) => {}
-            Err(error) => return self.fail(format!(": cannot read on: {error}")),
+            Err(error) => return Err(Fault::Unreadable(error.to_string())),
         }
         self.unended = self.line.last() != Some(&b'\n');
         if !self.unended {
             self.line.pop();
         } else if self.line.len() as u64 >= LONGEST_LINE {
-            return self.fail(" is longer than 1 MiB: this is no text log");
+            return Err(Fault::TooLong);
         }
         if self.line.last() == Some(&b'\r') {
             self.line.pop();
@@ -106,57 +147,35 @@ impl TextTable {
         Ok(true)
     }
 
-    /// Reads one row's fields into the wanted columns.
-    fn take_row(&mut self, rows: &mut Rows) -> Result<(), InputError> {
-        let mut count = 0;
-        let mut last_empty = false;
-        let comma = self.layout.decimal_comma;
-        for field in sniff::fields(&self.line, self.layout.delimiter) {
-            last_empty = field.is_empty();
-            let good = match self.slots.get(count) {
-                None | Some(Slot::Skip) => true,
-                Some(Slot::Axis(axis)) => match sniff::number(field, comma) {
-                    Some(x) => {
-                        rows.values[*axis].push(x);
-                        true
-                    }
-                    None => false,
-                },
-                Some(Slot::Beside(place)) => {
-                    rows.values[*place].push(sniff::number(field, comma).unwrap_or(f64::NAN));
-                    true
-                }
-                Some(Slot::Time) => match stamp(field, comma) {
-                    Some((whole, fraction)) => {
-                        let origin = match self.origin {
-                            None if fraction.is_finite() => *self.origin.insert((whole, fraction)),
-                            known => known.unwrap_or((0, 0.0)),
-                        };
-                        let since = i128::from(whole) - i128::from(origin.0);
-                        rows.time.push(since as f64 + (fraction - origin.1));
-                        true
-                    }
-                    None => false,
-                },
-            };
-            if !good {
-                let name = &self.layout.heads[count].full;
-                let text = String::from_utf8_lossy(&field[..field.len().min(40)]);
-                return self.fail(format!(", column '{name}': '{text}' is not a number"));
+    /// Up to so many rows, line by line.
+    fn plain_rows(&mut self, most: usize, rows: &mut Rows) -> Result<(), Fault> {
+        while rows.lines.len() < most && self.next_line()? {
+            if self.line_number == 1 && self.line.starts_with(BYTE_ORDER_MARK) {
+                self.line.drain(..BYTE_ORDER_MARK.len());
             }
-            count += 1;
+            if self.line_number >= self.layout.first_line && !Form::is_empty(&self.line) {
+                self.form.take(&self.line, self.line_number, self.unended, rows)?;
+            }
         }
-        let wanted = self.slots.len();
-        if count != wanted && !(count == wanted + 1 && last_empty) {
-            let fields = if count == 1 { "1 field" } else { &format!("{count} fields") };
-            let cut = if self.unended {
-                " (the file ends inside this line: remove it, or stop before it with --end)"
-            } else {
-                ""
-            };
-            return self.fail(format!(": {fields} where {wanted} are expected{cut}"));
+        Ok(())
+    }
+
+    /// The rows of the next chunk that has any; none at the end of the file.
+    fn chunk_rows(&mut self, ahead: &mut Ahead, rows: &mut Rows) -> Result<(), Fault> {
+        while let Some(mut chunk) = ahead.next(&mut *self.source.reader, self.source.step, &self.form) {
+            std::mem::swap(rows, &mut chunk.rows);
+            rows.lines.iter_mut().for_each(|line| *line += self.line_number);
+            self.line_number += chunk.lines;
+            let fault = chunk.fault.take();
+            ahead.give_back(chunk);
+            if let Some(fault) = fault {
+                self.line_number += 1;
+                return Err(fault);
+            }
+            if !rows.lines.is_empty() {
+                break;
+            }
         }
-        rows.lines.push(self.line_number);
         Ok(())
     }
 }
@@ -181,60 +200,55 @@ impl Table for TextTable {
         format!("{}: line {line}", self.path.display())
     }
     fn select(&mut self, time: Option<usize>, axes: &[usize], beside: Option<usize>) {
-        self.slots.fill(Slot::Skip);
+        let slots = &mut self.form.slots;
+        slots.fill(Slot::Skip);
         for (axis, &column) in axes.iter().enumerate() {
-            self.slots[column] = Slot::Axis(axis);
+            slots[column] = Slot::Axis(axis);
         }
         if let Some(column) = beside {
-            self.slots[column] = Slot::Beside(axes.len());
+            slots[column] = Slot::Beside(axes.len());
         }
         if let Some(column) = time {
-            self.slots[column] = Slot::Time;
+            slots[column] = Slot::Time;
         }
     }
     fn rewind(&mut self) -> Result<(), InputError> {
-        self.reader = open(&self.path)?;
-        self.line_number = 0;
+        self.source = open(&self.path)?;
+        (self.line_number, self.fault, self.ahead) = (0, None, None);
         Ok(())
     }
     fn origin(&self) -> f64 {
-        self.origin.map_or(0.0, |(whole, fraction)| whole as f64 + fraction)
+        self.form.origin.map_or(0.0, |(whole, fraction)| whole as f64 + fraction)
     }
     fn next_rows(&mut self, rows: &mut Rows) -> Result<bool, InputError> {
-        rows.clear(self.slots.iter().filter(|s| matches!(s, Slot::Axis(_) | Slot::Beside(_))).count());
-        while rows.lines.len() < BLOCK && self.next_line()? {
-            if self.line_number == 1 && self.line.starts_with(BYTE_ORDER_MARK) {
-                self.line.drain(..BYTE_ORDER_MARK.len());
+        if let Some(fault) = self.fault.take() {
+            return Err(self.refuse(fault));
+        }
+        rows.clear(self.form.columns_of_values());
+        let read = match (self.ahead.take(), self.chunk) {
+            (Some(mut ahead), _) => {
+                let read = self.chunk_rows(&mut ahead, rows);
+                self.ahead = Some(ahead);
+                read
             }
-            let skip = self.line_number < self.layout.first_line
-                || self.line.iter().all(u8::is_ascii_whitespace)
-                || sniff::is_comment(&self.line);
-            if !skip {
-                self.take_row(rows)?;
+            (None, None) => self.plain_rows(BLOCK, rows),
+            (None, Some(size)) => {
+                let read = self.plain_rows(FIRST, rows);
+                let timed = self.form.slots.iter().any(|slot| matches!(slot, Slot::Time));
+                if !rows.lines.is_empty() && (self.form.origin.is_some() || !timed) {
+                    self.ahead = Some(Ahead::new(size));
+                }
+                read
             }
+        };
+        match read {
+            Ok(()) => {}
+            // the rows before it may be all that is wanted
+            Err(fault) if !rows.lines.is_empty() => self.fault = Some(fault),
+            Err(fault) => return Err(self.refuse(fault)),
         }
         Ok(!rows.lines.is_empty())
     }
-}
-
-/// Whole and fraction apart, so that nanoseconds since 1970 keep their last digits.
-fn stamp(field: &[u8], decimal_comma: bool) -> Option<(i64, f64)> {
-    let text = std::str::from_utf8(field).ok()?;
-    let point = if decimal_comma { ',' } else { '.' };
-    let (whole, fraction) = text.split_once(point).unwrap_or((text, ""));
-    let digits = |s: &str| s.bytes().all(|b| b.is_ascii_digit());
-    let unsigned = whole.strip_prefix('-').unwrap_or(whole);
-    if !unsigned.is_empty()
-        && digits(unsigned)
-        && digits(fraction)
-        && fraction.len() < 19
-        && let Ok(whole_part) = whole.parse::<i64>()
-    {
-        let part = fraction.bytes().fold(0u64, |sum, b| sum * 10 + u64::from(b - b'0')) as f64;
-        let part = part / 10f64.powi(fraction.len() as i32);
-        return Some((whole_part, if whole.starts_with('-') { -part } else { part }));
-    }
-    sniff::number(field, decimal_comma).map(|x| (0, x))
 }
 
 /// Why this is no text log, if the first bytes say so.
@@ -263,3 +277,6 @@ fn not_text(bytes: &[u8]) -> Option<String> {
         "this is {what}; text (csv, also .gz), .npy, MATLAB, HDF5, ULog, DataFlash .bin, ROS bags and MCAP are read"
     ))
 }
+
+#[cfg(test)]
+mod tests;

@@ -10,17 +10,22 @@
 //! Nothing is repaired. NaN stays NaN, a gap stays a gap with its number of missing samples, everything else is kept.
 
 mod axis;
+mod line;
 pub(super) mod robust;
 mod stamps;
+mod together;
+mod windows;
 
 use std::ops::Range;
 
+use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use self::axis::AxisCheck;
 use self::robust::short;
 use self::stamps::{Count, Stamps, Timing, Verdict};
+use self::together::Together;
 use super::Gap;
 use crate::units::{Quantity, Unit};
 
@@ -93,6 +98,22 @@ struct Place {
     time_s: f64,
 }
 
+/// Where consecutive samples stand: the index of the first, and their stamps if they have any.
+#[derive(Clone, Copy, Debug)]
+struct Places<'a> {
+    first: u64,
+    times: &'a [f64],
+}
+
+impl<'a> Places<'a> {
+    fn at(&self, i: usize) -> Place {
+        Place { index: self.first + i as u64, time_s: self.times.get(i).copied().unwrap_or(f64::NAN) }
+    }
+    fn skip(self, count: usize) -> Places<'a> {
+        Places { first: self.first + count as u64, times: self.times.get(count..).unwrap_or_default() }
+    }
+}
+
 /// Time that goes back, at this row of the block pushed.
 #[derive(Clone, Copy, Debug)]
 pub struct BackwardStamp {
@@ -136,8 +157,7 @@ pub struct Checker {
     /// Seconds from the start of the log to the first sample pushed.
     offset_s: f64,
     rows: u64,
-    zero_rows: Count,
-    repeated_rows: Count,
+    together: Together,
 }
 
 impl Checker {
@@ -150,14 +170,15 @@ impl Checker {
         stamped: bool,
         period_s: Option<f64>,
     ) -> Self {
+        let axes: Vec<AxisCheck> =
+            axes.into_iter().map(|(name, unit)| AxisCheck::new(name, unit, quantity, kind)).collect();
         Checker {
-            axes: axes.into_iter().map(|(name, unit)| AxisCheck::new(name, unit, quantity, kind)).collect(),
+            together: Together::new(axes.len()),
+            axes,
             stamps: stamped.then(|| Stamps::new(period_s)),
             rate_hz,
             offset_s: 0.0,
             rows: 0,
-            zero_rows: Count::default(),
-            repeated_rows: Count::default(),
         }
     }
 
@@ -174,24 +195,19 @@ impl Checker {
     /// These rows of a block: stamps in s (as many as rows, or none) and per axis SI values. Backward time is an error unless
     /// the rate was given.
     pub fn push(&mut self, times: &[f64], values: &[Vec<f64>], rows: Range<usize>) -> Result<(), BackwardStamp> {
-        for row in rows {
-            let place = Place { index: self.rows, time_s: times.get(row).copied().unwrap_or(f64::NAN) };
-            if let Some(stamps) = self.stamps.as_mut().filter(|_| place.time_s.is_finite())
-                && let Some(from_s) = stamps.add(place)
-                && self.rate_hz.is_none()
-            {
-                return Err(BackwardStamp { row, from_s, to_s: place.time_s });
-            }
-            self.rows += 1;
-            let (mut zero, mut repeated) = (Alike::default(), Alike::default());
-            for (i, (axis, column)) in self.axes.iter_mut().zip(values).enumerate() {
-                zero.look(i, column[row] == 0.0);
-                repeated.look(i, axis.add(column[row], place));
-            }
-            zero.count(place, &mut self.zero_rows, &mut self.axes, |axis| &mut axis.only_not_zero);
-            repeated.count(place, &mut self.repeated_rows, &mut self.axes, |axis| &mut axis.only_not_repeated);
+        let places = Places { first: self.rows, times: times.get(rows.clone()).unwrap_or_default() };
+        let columns: Vec<&[f64]> = values.iter().take(self.axes.len()).map(|column| &column[rows.clone()]).collect();
+        let (axes, together, stamps) = (&mut self.axes, &mut self.together, self.stamps.as_mut());
+        let strict = self.rate_hz.is_none();
+        let each_axis = || axes.par_iter_mut().zip(&columns).for_each(|(axis, column)| axis.add_all(column, places));
+        let all_axes = || together.add_all(&columns, places);
+        let time = || stamps.and_then(|stamps| stamps.add_all(places, strict));
+        let (back, _) = rayon::join(time, || rayon::join(each_axis, all_axes));
+        self.rows += rows.len() as u64;
+        match back {
+            Some((row, from_s)) => Err(BackwardStamp { row: rows.start + row, from_s, to_s: places.at(row).time_s }),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     pub fn finish(self) -> Outcome {
@@ -246,15 +262,15 @@ impl Checker {
             return notes; // one axis cannot be told from its own values
         }
         // rows by chance if the axes are independent: each axis' share is taken from the rows in which some other axis differs
-        let by_chance = |count: u64, of_axis: &dyn Fn(&AxisCheck) -> (u64, u64)| {
-            let share = |axis: &AxisCheck| {
-                let (alike, alone_different) = of_axis(axis);
-                (alike - count) as f64 / (rows - (count + alone_different) as f64).max(1.0)
+        let by_chance = |count: u64, alike: &dyn Fn(&AxisCheck) -> u64, alone: &[u64]| {
+            let share = |(axis, alone): (&AxisCheck, &u64)| {
+                (alike(axis) - count) as f64 / (rows - (count + alone) as f64).max(1.0)
             };
-            rows * self.axes.iter().map(share).product::<f64>()
+            rows * self.axes.iter().zip(alone).map(share).product::<f64>()
         };
-        if let Count { count, first: Some(first) } = self.zero_rows
-            && unlikely(count as f64, by_chance(count, &|axis| (axis.zeros, axis.only_not_zero)))
+        let together = &self.together;
+        if let Count { count, first: Some(first) } = together.zero.rows
+            && unlikely(count as f64, by_chance(count, &|axis| axis.zeros, &together.zero.all_but))
         {
             notes.push(Note {
                 kind: "zero-row",
@@ -264,9 +280,9 @@ impl Checker {
                 serious: count > 2 && count as f64 > 1e-3 * rows,
             });
         }
-        if let Count { count, first: Some(first) } = self.repeated_rows
+        if let Count { count, first: Some(first) } = together.repeated.rows
             && count as f64 > 0.01 * rows
-            && unlikely(count as f64, by_chance(count, &|axis| (axis.repeats, axis.only_not_repeated)))
+            && unlikely(count as f64, by_chance(count, &|axis| axis.repeats, &together.repeated.all_but))
         {
             notes.push(Note {
                 kind: "repeated-row",
@@ -280,29 +296,6 @@ impl Checker {
             });
         }
         notes
-    }
-}
-
-/// Whether the axes of a row are alike (all zero, all repeated), or all but one.
-#[derive(Default)]
-struct Alike {
-    different: usize,
-    which: usize,
-}
-
-impl Alike {
-    fn look(&mut self, axis: usize, alike: bool) {
-        if !alike {
-            self.different += 1;
-            self.which = axis;
-        }
-    }
-    fn count(self, place: Place, all: &mut Count, axes: &mut [AxisCheck], alone: impl Fn(&mut AxisCheck) -> &mut u64) {
-        match self.different {
-            0 => all.add(place),
-            1 => *alone(&mut axes[self.which]) += 1,
-            _ => {}
-        }
     }
 }
 

@@ -16,15 +16,14 @@ use std::collections::BTreeMap;
 
 use super::robust::{Sample, median, median_and_spread, quantile, short};
 use super::stamps::Count;
-use super::{InputKind, Note, Place};
-use crate::numerics::reduce::Moments;
+use super::windows::{Windows, extent, surely_quiet};
+use super::{InputKind, Note, Place, Places};
+use crate::numerics::reduce::{Moments, by_eight};
 use crate::units::{Quantity, Unit};
 
 const WINDOW: usize = 1000;
 const SHORTEST_WINDOW: usize = 50;
 const OUTLIER: f64 = 8.0;
-const REST_WINDOW: u64 = 64;
-const REST_WINDOWS: usize = 4096;
 
 /// A value at one end of the range, how often, and how often the next one inside.
 #[derive(Clone, Debug)]
@@ -55,35 +54,6 @@ impl Extreme {
     }
 }
 
-/// Moments of consecutive windows; neighbours are merged when there are too many.
-#[derive(Clone, Debug)]
-struct Windows {
-    size: u64,
-    done: Vec<(Moments, Place)>,
-    open: Moments,
-    start: Option<Place>,
-}
-
-impl Windows {
-    fn add(&mut self, x: f64, place: Place) {
-        let start = *self.start.get_or_insert(place);
-        self.open.add(x);
-        if self.open.count == self.size {
-            self.done.push((std::mem::take(&mut self.open), start));
-            self.start = None;
-            if self.done.len() == REST_WINDOWS {
-                self.size *= 2;
-                let merged = self.done.chunks_exact(2).map(|pair| {
-                    let mut moments = pair[0].0;
-                    moments.merge(&pair[1].0);
-                    (moments, pair[0].1)
-                });
-                self.done = merged.collect();
-            }
-        }
-    }
-}
-
 /// Streaming check of one axis.
 #[derive(Clone, Debug)]
 pub(super) struct AxisCheck {
@@ -97,16 +67,14 @@ pub(super) struct AxisCheck {
     pub(super) range: (f64, f64),
     pub(super) zeros: u64,
     pub(super) repeats: u64,
-    /// Rows in which this axis alone is not zero, or does not repeat.
-    pub(super) only_not_zero: u64,
-    pub(super) only_not_repeated: u64,
     previous: Option<f64>,
     run: (u64, Option<Place>),
     runs: BTreeMap<u64, Count>,
     top: Extreme,
     bottom: Extreme,
     sample: Sample,
-    window: Vec<(f64, Place)>,
+    window: Vec<f64>,
+    window_places: Vec<Place>,
     scratch: Vec<f64>,
     outliers: Count,
     largest_outlier: f64,
@@ -126,8 +94,6 @@ impl AxisCheck {
             range: (f64::INFINITY, f64::NEG_INFINITY),
             zeros: 0,
             repeats: 0,
-            only_not_zero: 0,
-            only_not_repeated: 0,
             previous: None,
             run: (0, None),
             runs: BTreeMap::new(),
@@ -135,27 +101,84 @@ impl AxisCheck {
             bottom: Extreme::new(),
             sample: Sample::new(1 << 14),
             window: Vec::with_capacity(WINDOW),
+            window_places: Vec::with_capacity(WINDOW),
             scratch: Vec::with_capacity(WINDOW),
             outliers: Count::default(),
             largest_outlier: 0.0,
             disturbed: Count::default(),
-            rest: Windows { size: REST_WINDOW, done: Vec::new(), open: Moments::default(), start: None },
+            rest: Windows::new(),
         }
     }
 
-    /// The next value (SI); true if it equals the one before.
-    pub(super) fn add(&mut self, value: f64, place: Place) -> bool {
+    /// The next values (SI): many at once where they are finite, with the same result as one by one.
+    pub(super) fn add_all(&mut self, mut values: &[f64], mut places: Places) {
+        while !values.is_empty() {
+            // up to the end of the window in which outliers are sought
+            let (part, rest) = values.split_at(values.len().min(WINDOW - self.window.len()));
+            // 0 x is NaN for what is not finite
+            if self.kind == InputKind::Angle || by_eight(part, |x| 0.0 * x) != 0.0 {
+                part.iter().enumerate().for_each(|(i, x)| self.add(*x, places.at(i)));
+            } else {
+                self.add_finite(part, places);
+            }
+            (values, places) = (rest, places.skip(part.len()));
+        }
+    }
+
+    fn add_finite(&mut self, part: &[f64], places: Places) {
+        let (smallest, largest) = extent(part);
+        self.usable += part.len() as u64;
+        self.range = (self.range.0.min(smallest), self.range.1.max(largest));
+        if smallest <= 0.0 && largest >= 0.0 {
+            self.zeros += by_eight(part, |x| if x == 0.0 { 1.0 } else { 0.0 }) as u64;
+        }
+        let previous = self.previous.replace(part[part.len() - 1]);
+        let alike = |pair: &[f64]| pair[0] == pair[1];
+        if previous == Some(part[0]) || part.windows(2).fold(false, |any, pair| any | alike(pair)) {
+            let mut previous = previous;
+            for (i, x) in part.iter().enumerate() {
+                self.follow(previous.replace(*x) == Some(*x), places.at(i));
+            }
+        } else {
+            self.end_run();
+            self.run = (1, Some(places.at(part.len() - 1)));
+        }
+        if largest >= self.top.inner {
+            part.iter().enumerate().for_each(|(i, x)| self.top.add(*x, places.at(i)));
+        }
+        if -smallest >= self.bottom.inner {
+            part.iter().enumerate().for_each(|(i, x)| self.bottom.add(-*x, places.at(i)));
+        }
+        self.look(part, places);
+    }
+
+    /// The next value (SI).
+    fn add(&mut self, value: f64, place: Place) {
         if !value.is_finite() {
             self.nan.add(place);
             self.end_run();
             self.previous = None;
-            return false;
+            return;
         }
         self.usable += 1;
         self.range = (self.range.0.min(value), self.range.1.max(value));
         self.zeros += u64::from(value == 0.0);
         let previous = self.previous.replace(value);
-        let repeated = previous == Some(value);
+        self.follow(previous == Some(value), place);
+        let places = Places { first: place.index, times: &[place.time_s] };
+        match (self.kind, previous) {
+            (InputKind::Angle, Some(previous)) => self.look(&[value - previous], places),
+            (InputKind::Angle, None) => {}
+            _ => {
+                self.top.add(value, place);
+                self.bottom.add(-value, place);
+                self.look(&[value], places);
+            }
+        }
+    }
+
+    /// The run of equal values goes on, or the next one begins.
+    fn follow(&mut self, repeated: bool, place: Place) {
         if repeated {
             self.repeats += 1;
             self.run.0 += 1;
@@ -163,16 +186,6 @@ impl AxisCheck {
             self.end_run();
             self.run = (1, Some(place));
         }
-        match (self.kind, previous) {
-            (InputKind::Angle, Some(previous)) => self.look(value - previous, place),
-            (InputKind::Angle, None) => {}
-            _ => {
-                self.top.add(value, place);
-                self.bottom.add(-value, place);
-                self.look(value, place);
-            }
-        }
-        repeated
     }
 
     fn end_run(&mut self) {
@@ -182,36 +195,52 @@ impl AxisCheck {
         self.run = (0, None);
     }
 
-    fn look(&mut self, x: f64, place: Place) {
-        self.sample.add(x);
-        self.rest.add(x, place);
-        self.window.push((x, place));
+    /// Values that do not reach beyond the window.
+    fn look(&mut self, x: &[f64], places: Places) {
+        self.sample.add_all(x);
+        self.rest.add_all(x, places);
+        if x.len() == WINDOW {
+            return self.judge(x, |i| places.at(i));
+        }
+        self.window.extend_from_slice(x);
+        self.window_places.extend((0..x.len()).map(|i| places.at(i)));
         if self.window.len() == WINDOW {
             self.close_window();
         }
     }
 
     fn close_window(&mut self) {
+        let (mut window, mut places) = (std::mem::take(&mut self.window), std::mem::take(&mut self.window_places));
+        self.judge(&window, |i| places[i]);
+        window.clear();
+        places.clear();
+        (self.window, self.window_places) = (window, places);
+    }
+
+    /// Outliers of a window.
+    fn judge(&mut self, window: &[f64], place: impl Fn(usize) -> Place) {
+        if surely_quiet(window, OUTLIER * 1.4826) {
+            return;
+        }
         self.scratch.clear();
-        self.scratch.extend(self.window.iter().map(|(x, _)| *x));
+        self.scratch.extend_from_slice(window);
         let (center, mut spread) = median_and_spread(&mut self.scratch);
         if spread == 0.0 {
             // more than half are equal: measure in steps of the values
             spread = self.scratch.iter().copied().filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
         }
         let bound = OUTLIER * spread;
-        let far = self.window.iter().filter(|(x, _)| (x - center).abs() > bound);
-        if far.clone().count() * 100 > self.window.len() {
-            self.disturbed.add(self.window[0].1);
+        let far = window.iter().enumerate().filter(|(_, x)| (*x - center).abs() > bound);
+        if far.clone().count() * 100 > window.len() {
+            self.disturbed.add(place(0));
         } else {
-            for (x, place) in far {
-                self.outliers.add(*place);
+            for (i, x) in far {
+                self.outliers.add(place(i));
                 if (x - center).abs() > self.largest_outlier.abs() {
                     self.largest_outlier = x - center;
                 }
             }
         }
-        self.window.clear();
     }
 
     /// `12.3 deg/s`

@@ -14,9 +14,7 @@ fn noise(n: usize, sigma: f64, axis: u32) -> Vec<f64> {
 fn check(values: &[f64], kind: InputKind) -> Vec<Note> {
     let unit = Unit::parse(if kind == InputKind::Rate { "deg/s" } else { "deg" }).unwrap();
     let mut axis = AxisCheck::new("x", &unit, Quantity::AngularRate, kind);
-    for (i, x) in values.iter().enumerate() {
-        axis.add(*x, Place { index: i as u64, time_s: f64::NAN });
-    }
+    axis.add_all(values, Places { first: 0, times: &[] });
     axis.findings(100.0)
 }
 

@@ -27,6 +27,20 @@ impl Sample {
             self.kept.retain(|(hash, _)| hash.leading_zeros() >= level);
         }
     }
+    /// The same one by one.
+    pub(super) fn add_all(&mut self, x: &[f64]) {
+        let first = self.index;
+        let mut bound = u64::MAX >> self.level;
+        for (index, x) in (first..).zip(x) {
+            // hash.leading_zeros() >= level
+            if mix(index) <= bound {
+                self.index = index;
+                self.add(*x);
+                bound = u64::MAX >> self.level;
+            }
+        }
+        self.index = first + x.len() as u64;
+    }
     pub(super) fn values(&self) -> Vec<f64> {
         self.kept.iter().map(|(_, x)| *x).collect()
     }

@@ -11,8 +11,10 @@
 //!   within 2.5 T): then one stamp was late.
 //! - T is the typical step, refined to (span − gaps) / (steps outside gaps), so that it does not drift over a long log.
 
-use super::Place;
+use super::line::Line;
 use super::robust::{Sample, quantile};
+use super::windows::extent;
+use super::{Place, Places};
 use crate::signal::Gap;
 
 /// More gaps than this are no gaps but another clock.
@@ -70,11 +72,9 @@ pub(super) struct Stamps {
     sample: Sample,
     steps: u64,
     pub(super) longest: f64,
-    // running least squares of stamp on row number
-    mean_row: f64,
-    mean_time: f64,
-    rows_rows: f64,
-    rows_time: f64,
+    /// Of the stamps over the row numbers.
+    line: Line,
+    scratch: Vec<f64>,
 }
 
 /// What the stamps say.
@@ -116,23 +116,61 @@ impl Stamps {
             sample: Sample::new(1 << 16),
             steps: 0,
             longest: 0.0,
-            mean_row: 0.0,
-            mean_time: 0.0,
-            rows_rows: 0.0,
-            rows_time: 0.0,
+            line: Line::default(),
+            scratch: Vec::new(),
         }
+    }
+
+    /// The stamps of further rows, those that are not finite left out: many at once where the steps are regular, with the same result as one
+    /// by one. The first row at which time goes back and the stamp before it, if `strict`; nothing is read beyond.
+    pub(super) fn add_all(&mut self, mut places: Places, strict: bool) -> Option<(usize, f64)> {
+        const PART: usize = 512;
+        let mut done = 0;
+        while !places.times.is_empty() {
+            let part = &places.times[..places.times.len().min(PART)];
+            if !self.add_regular(part, places.first) {
+                for (i, time) in part.iter().enumerate().filter(|(_, time)| time.is_finite()) {
+                    let back = self.add(Place { index: places.first + i as u64, time_s: *time });
+                    if let Some(from) = back.filter(|_| strict) {
+                        return Some((done + i, from));
+                    }
+                }
+            }
+            done += part.len();
+            places = places.skip(part.len());
+        }
+        None
+    }
+
+    /// Takes the stamps if every step goes on and none is long.
+    fn add_regular(&mut self, times: &[f64], row: u64) -> bool {
+        let Some(period) = self.provisional.filter(|_| self.rows > 0 && self.repeats == 0) else { return false };
+        let mut steps = std::mem::take(&mut self.scratch);
+        steps.clear();
+        steps.push(times[0] - self.last);
+        steps.extend(times.windows(2).map(|pair| pair[1] - pair[0]));
+        let regular = steps.iter().fold(true, |all, step| all & (*step > 0.0) & (*step <= 1.2 * period));
+        if regular {
+            self.rows += times.len() as u64;
+            self.line.add(row, times);
+            self.last = times[times.len() - 1];
+            self.longest = self.longest.max(extent(&steps).1);
+            self.steps += steps.len() as u64;
+            self.sample.add_all(&steps);
+            if let Some((_, next)) = self.long.last_mut().filter(|_| self.next_wanted) {
+                *next = steps[0];
+            }
+            self.next_wanted = false;
+        }
+        self.scratch = steps;
+        regular
     }
 
     /// The stamp of the next row; `Some(previous)` if time goes back.
     pub(super) fn add(&mut self, place: Place) -> Option<f64> {
         let time = place.time_s;
         self.rows += 1;
-        let row = place.index as f64;
-        let (from_row, from_time) = (row - self.mean_row, time - self.mean_time);
-        self.mean_row += from_row / self.rows as f64;
-        self.mean_time += from_time / self.rows as f64;
-        self.rows_rows += from_row * (row - self.mean_row);
-        self.rows_time += from_row * (time - self.mean_time);
+        self.line.add(place.index, &[time]);
         if self.rows == 1 {
             (self.first, self.last) = (time, time);
             return None;
@@ -196,7 +234,7 @@ impl Stamps {
 
     /// Mean period by least squares.
     pub(super) fn mean_period(&self) -> f64 {
-        self.rows_time / self.rows_rows
+        self.line.slope()
     }
 
     pub(super) fn finish(mut self) -> Verdict {

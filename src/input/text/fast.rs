@@ -1,0 +1,336 @@
+//! Many lines of a text log at once, column by column, where all lines of a piece are alike: every one has a field for each column, no quotes.
+//!
+//! A field that is not a plain number is handed to [`sniff::number`], and the lines of a piece that are not alike to [`Form::take`], so that
+//! every form is read, and refused, as the plain way does it.
+
+use super::super::Rows;
+use super::super::sniff::{self, Delimiter};
+use super::digits::{self, Bytes, LEAD, Words, decimal, eight, ten};
+use super::row::{Fault, Form, Slot, since, stamp};
+
+/// Lines are looked at in pieces that stay in the nearest cache.
+const PIECE: usize = 1 << 13;
+/// Room that a text needs behind its lines.
+pub(super) const ROOM: usize = 64;
+
+/// Reads lines into rows; keeps its memory.
+#[derive(Debug, Default)]
+pub(super) struct Lines {
+    /// Of all fields of a piece.
+    ends: Vec<u32>,
+}
+
+/// Lines to be read: `text[LEAD..end]`, each with its end, and [`ROOM`] bytes behind them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Text<'a> {
+    pub(super) bytes: &'a [u8],
+    pub(super) end: usize,
+    /// The file has no line end after the last line.
+    pub(super) unended: bool,
+}
+
+impl Lines {
+    /// The lines into `rows`, numbered from 1. Returns how many there are; the fault is that of the line behind them.
+    pub(super) fn read(&mut self, form: &Form, text: Text, rows: &mut Rows) -> (u64, Option<Fault>) {
+        #[cfg(target_arch = "x86_64")]
+        if let Some(simd) = pulp::x86::V3::try_new() {
+            return simd.vectorize(Reading { lines: self, form, text, rows, simd });
+        }
+        self.read_by(Words, form, text, rows)
+    }
+
+    #[inline(always)]
+    pub(super) fn read_by(
+        &mut self,
+        simd: impl Bytes,
+        form: &Form,
+        text: Text,
+        rows: &mut Rows,
+    ) -> (u64, Option<Fault>) {
+        let Text { bytes, end, unended } = text;
+        let mut lines = 0;
+        let mut from = LEAD;
+        while from < end {
+            let near = end.min(from + PIECE);
+            let last = match bytes[from..near].iter().rposition(|b| *b == b'\n') {
+                Some(last) => from + last,
+                None => bytes[near..end].iter().position(|b| *b == b'\n').map_or(end - 1, |next| near + next),
+            };
+            let whole = rows.lines.len();
+            // no closures here: they would not be compiled for the instructions of `simd`
+            let fields = match self.ends(simd, form.delimiter, bytes, from, last + 1) {
+                Some(count) => Fields::new(form, bytes, from, &self.ends[..count]),
+                None => None,
+            };
+            let read = match &fields {
+                Some(fields) if fields.numbers(simd, rows) => fields.rows as u64,
+                _ => 0,
+            };
+            if read > 0 {
+                rows.lines.extend(lines + 1..=lines + read);
+                lines += read;
+            } else {
+                truncate(rows, whole);
+                let piece = Text { bytes: &bytes[from..last], end: last - from, unended: unended && last + 1 == end };
+                if let Err(fault) = plainly(form, piece, &mut lines, rows) {
+                    return (lines, Some(fault));
+                }
+            }
+            from = last + 1;
+        }
+        (lines, None)
+    }
+
+    /// Where the fields of these lines end; how many there are. `None` if there is a quote.
+    #[inline(always)]
+    fn ends(&mut self, simd: impl Bytes, delimiter: Delimiter, text: &[u8], from: usize, end: usize) -> Option<usize> {
+        let separators = match delimiter {
+            Delimiter::Byte(byte) => [byte, byte],
+            Delimiter::Spaces => [b' ', b'\t'],
+        };
+        self.ends.resize(self.ends.len().max(end - from + 64), 0);
+        let mut count = 0;
+        for (at, block) in (from..end).step_by(64).zip(text[from..].as_chunks::<64>().0) {
+            let (mut ends, mut quotes) = simd.ends(block, separators);
+            if end - at < 64 {
+                let inside = (1 << (end - at)) - 1;
+                (ends, quotes) = (ends & inside, quotes & inside);
+            }
+            if quotes != 0 {
+                return None;
+            }
+            let places = self.ends[count..].first_chunk_mut::<64>()?;
+            count += ends.count_ones() as usize;
+            // four at a time: how many there are is less of a surprise
+            for four in places.as_chunks_mut::<4>().0 {
+                for place in four {
+                    *place = at as u32 + ends.trailing_zeros();
+                    ends &= ends.wrapping_sub(1);
+                }
+                if ends == 0 {
+                    break;
+                }
+            }
+        }
+        Some(count)
+    }
+}
+
+/// Line by line; `piece` has no end of the last line.
+#[inline(never)]
+fn plainly(form: &Form, piece: Text, lines: &mut u64, rows: &mut Rows) -> Result<(), Fault> {
+    let mut form = form.clone();
+    let mut left = Some(piece.bytes);
+    while let Some(text) = left {
+        let end = text.iter().position(|b| *b == b'\n');
+        left = end.map(|end| &text[end + 1..]);
+        let line = &text[..end.unwrap_or(text.len())];
+        let line = line.strip_suffix(b"\r").unwrap_or(line);
+        if !Form::is_empty(line) {
+            form.take(line, *lines + 1, piece.unended && left.is_none(), rows)?;
+        }
+        *lines += 1;
+    }
+    Ok(())
+}
+
+fn truncate(rows: &mut Rows, whole: usize) {
+    rows.time.truncate(whole);
+    rows.values.iter_mut().for_each(|column| column.truncate(whole));
+}
+
+/// [`Lines::read_by`] as it is called where the processor has these instructions.
+#[cfg(target_arch = "x86_64")]
+struct Reading<'a> {
+    lines: &'a mut Lines,
+    form: &'a Form,
+    text: Text<'a>,
+    rows: &'a mut Rows,
+    simd: pulp::x86::V3,
+}
+
+#[cfg(target_arch = "x86_64")]
+impl pulp::NullaryFnOnce for Reading<'_> {
+    type Output = (u64, Option<Fault>);
+
+    #[inline(always)]
+    fn call(self) -> Self::Output {
+        self.lines.read_by(self.simd, self.form, self.text, self.rows)
+    }
+}
+
+/// Lines that are alike.
+struct Fields<'a> {
+    form: &'a Form,
+    text: &'a [u8],
+    from: usize,
+    ends: &'a [u32],
+    rows: usize,
+    /// Of one row: one more than columns where a separator stands behind each row.
+    count: usize,
+}
+
+/// Sign, digits before the point, digits behind it, and how many.
+struct Decimal {
+    negative: bool,
+    whole: u64,
+    fraction: u64,
+    count: usize,
+}
+
+impl<'a> Fields<'a> {
+    /// `None` if the lines are not alike.
+    #[inline(always)]
+    fn new(form: &'a Form, text: &'a [u8], from: usize, ends: &'a [u32]) -> Option<Self> {
+        let columns = form.slots.len();
+        let is_last = |end: &u32| text[*end as usize] == b'\n';
+        let count = ends.iter().take(columns + 1).position(is_last)? + 1;
+        if count < columns || !ends.len().is_multiple_of(count) {
+            return None;
+        }
+        let fields = Fields { form, text, from, ends, rows: ends.len() / count, count };
+        for (row, ends) in ends.chunks_exact(count).enumerate() {
+            let (last, others) = ends.split_last()?;
+            if !is_last(last) || others.iter().any(is_last) {
+                return None;
+            }
+            if count > columns && !fields.field(row, columns).trim_ascii().is_empty() {
+                return None;
+            }
+            // several blanks are one separator
+            let is_empty = |column: usize| fields.field(row, column).is_empty();
+            if form.delimiter == Delimiter::Spaces && (0..count).any(is_empty) {
+                return None;
+            }
+            // no comment and nothing before the first field; what is no number is found there
+            if matches!(form.slots[0], Slot::Skip)
+                && matches!(fields.field(row, 0).first(), None | Some(b'#' | b'%' | b'/' | b' ' | b'\t'))
+            {
+                return None;
+            }
+        }
+        Some(fields)
+    }
+
+    /// Begin and end of a field.
+    #[inline(always)]
+    fn place(&self, row: usize, column: usize) -> (usize, usize) {
+        let i = row * self.count + column;
+        let from = if i == 0 { self.from } else { self.ends[i - 1] as usize + 1 };
+        let end = self.ends[i] as usize;
+        let line_end = column + 1 == self.count && end > from && self.text[end - 1] == b'\r';
+        (from, end - usize::from(line_end))
+    }
+
+    fn field(&self, row: usize, column: usize) -> &[u8] {
+        let (from, end) = self.place(row, column);
+        &self.text[from..end]
+    }
+
+    /// All wanted columns; false if some field shows that the line is not alike.
+    #[inline(always)]
+    fn numbers(&self, simd: impl Bytes, rows: &mut Rows) -> bool {
+        for (column, slot) in self.form.slots.iter().enumerate() {
+            match *slot {
+                Slot::Skip => {}
+                Slot::Axis(axis) | Slot::Beside(axis) => {
+                    let values = &mut rows.values[axis];
+                    values.reserve(self.rows);
+                    for row in 0..self.rows {
+                        let (from, end) = self.place(row, column);
+                        let value = match self.decimal(simd, from, end) {
+                            Some(Decimal { negative, whole, fraction, count }) => {
+                                let value = decimal(whole, fraction, count);
+                                f64::from_bits(value.to_bits() | u64::from(negative) << 63)
+                            }
+                            None => match self.other_number(from, end, slot) {
+                                Some(value) => value,
+                                None => return false,
+                            },
+                        };
+                        values.push(value);
+                    }
+                }
+                Slot::Time => {
+                    let Some(origin) = self.form.origin else { return false };
+                    rows.time.reserve(self.rows);
+                    for row in 0..self.rows {
+                        let (from, end) = self.place(row, column);
+                        let (whole, part) = match self.decimal(simd, from, end) {
+                            Some(Decimal { negative, whole, fraction, count }) => {
+                                let (whole, part) = (whole as i64, fraction as i64 as f64 / ten(count));
+                                if negative { (-whole, -part) } else { (whole, part) }
+                            }
+                            None => match self.other_stamp(from, end) {
+                                Some(split) => split,
+                                None => return false,
+                            },
+                        };
+                        rows.time.push(since(origin, whole, part));
+                    }
+                }
+            }
+        }
+        true
+    }
+
+    /// The field, if it is a sign or none, 1 to 8 digits, a decimal point, and 1 to 16 digits.
+    #[inline(always)]
+    fn decimal(&self, simd: impl Bytes, from: usize, end: usize) -> Option<Decimal> {
+        let near = self.text[..end].last_chunk::<32>()?;
+        let length = end - from;
+        if length.wrapping_sub(1) >= 32 {
+            return None;
+        }
+        // the first bit is that of the first byte of the field
+        let others = simd.others(near) >> (32 - length);
+        let negative = near[32 - length] == b'-';
+        let point = others & !u32::from(negative);
+        let at = point.trailing_zeros() as usize;
+        let (whole, count) = (at.wrapping_sub(usize::from(negative)), length.wrapping_sub(at + 1));
+        let one = (point != 0) & (point & point.wrapping_sub(1) == 0);
+        let fits = (whole.wrapping_sub(1) < 8) & (count.wrapping_sub(1) < 16) & (whole.wrapping_add(count) <= 19);
+        let sign = if self.form.decimal_comma { b',' } else { b'.' };
+        if !(one & fits & (near[31_usize.wrapping_sub(count) & 31] == sign)) {
+            return None;
+        }
+        let digits = near.last_chunk::<16>()?;
+        let before = match whole {
+            1 => u64::from(near[30_usize.wrapping_sub(count) & 31] & 15),
+            _ => eight(self.text, end - count - 1, whole),
+        };
+        Some(Decimal { negative, whole: before, fraction: simd.sixteen(digits, count), count })
+    }
+
+    /// Any field without blanks around; `None` if this is no row.
+    fn trimmed(&self, from: usize, end: usize) -> Option<&[u8]> {
+        let field = &self.text[from..end];
+        let lead = field.iter().position(|b| *b != b' ' && *b != b'\t').unwrap_or(field.len());
+        let field = field[lead..].trim_ascii_end();
+        // between blanks there are no empty fields; an empty line and a comment are no rows
+        let first = from == self.from || self.text[from - 1] == b'\n';
+        let none = match field.first() {
+            None => first || self.form.delimiter == Delimiter::Spaces,
+            Some(b'#' | b'%' | b'/') => first,
+            Some(_) => false,
+        };
+        (!none).then_some(field)
+    }
+
+    #[inline(never)]
+    fn other_number(&self, from: usize, end: usize, slot: &Slot) -> Option<f64> {
+        let comma = self.form.decimal_comma;
+        let field = self.trimmed(from, end)?;
+        match (digits::number(field, comma).or_else(|| sniff::number(field, comma)), slot) {
+            (None, Slot::Beside(_)) => Some(f64::NAN),
+            (value, _) => value,
+        }
+    }
+
+    #[inline(never)]
+    fn other_stamp(&self, from: usize, end: usize) -> Option<(i64, f64)> {
+        let comma = self.form.decimal_comma;
+        let field = self.trimmed(from, end)?;
+        digits::integer(field).map(|whole| (whole, 0.0)).or_else(|| stamp(field, comma))
+    }
+}

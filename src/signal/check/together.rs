@@ -1,0 +1,75 @@
+//! Rows in which all axes are alike: all zero, or all as in the row before.
+
+use super::Places;
+use super::stamps::Count;
+
+/// Rows looked at together.
+const PART: usize = 512;
+
+/// Rows in which all axes are alike.
+#[derive(Clone, Debug)]
+pub(super) struct Alike {
+    pub(super) rows: Count,
+    /// Per axis, rows in which all the others are alike.
+    pub(super) all_but: Vec<u64>,
+}
+
+/// Streaming count of such rows; none are counted for a single axis.
+#[derive(Clone, Debug)]
+pub(super) struct Together {
+    pub(super) zero: Alike,
+    pub(super) repeated: Alike,
+    /// The last row.
+    before: Vec<f64>,
+}
+
+impl Together {
+    pub(super) fn new(axes: usize) -> Self {
+        let none = Alike { rows: Count::default(), all_but: vec![0; axes] };
+        Together { zero: none.clone(), repeated: none, before: vec![f64::NAN; axes] }
+    }
+
+    /// One column of further rows for each axis.
+    pub(super) fn add_all(&mut self, columns: &[&[f64]], places: Places) {
+        let rows = columns.first().map_or(0, |column| column.len());
+        if columns.len() < 2 {
+            return;
+        }
+        for start in (0..rows).step_by(PART) {
+            let end = rows.min(start + PART);
+            let zero = |column: &&&[f64]| column[start..end].iter().fold(false, |any, x| any | (*x == 0.0));
+            // all axes but one must have such a value for a row to count
+            if columns.iter().filter(zero).count() + 1 >= columns.len() {
+                self.zero.add(columns.len(), start..end, places, |axis, row| columns[axis][row] == 0.0);
+            }
+            let before = &self.before;
+            let repeated = |axis: usize, row: usize| {
+                let x = columns[axis][row];
+                x.is_finite() && x == if row == 0 { before[axis] } else { columns[axis][row - 1] }
+            };
+            let any = |axis: &usize| {
+                let column = &columns[*axis][start.max(1) - 1..end];
+                column.windows(2).fold(start == 0 && repeated(*axis, 0), |any, pair| any | (pair[0] == pair[1]))
+            };
+            if (0..columns.len()).filter(any).count() + 1 >= columns.len() {
+                self.repeated.add(columns.len(), start..end, places, repeated);
+            }
+        }
+        if rows > 0 {
+            self.before.iter_mut().zip(columns).for_each(|(before, column)| *before = column[rows - 1]);
+        }
+    }
+}
+
+impl Alike {
+    fn add(&mut self, axes: usize, rows: std::ops::Range<usize>, places: Places, is: impl Fn(usize, usize) -> bool) {
+        for row in rows {
+            let mut others = (0..axes).filter(|axis| !is(*axis, row));
+            match (others.next(), others.next()) {
+                (None, _) => self.rows.add(places.at(row)),
+                (Some(axis), None) => self.all_but[axis] += 1,
+                _ => {}
+            }
+        }
+    }
+}

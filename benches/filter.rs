@@ -1,6 +1,7 @@
-//! One predict and update of the reference sensor's filter, ours (sizes known at run time, innovation statistics and gate included)
-//! against the same equations written by hand with statically sized nalgebra matrices on the same data; and the exact expectation of
-//! a mismatched filter.
+//! A log through the reference sensor's filter: whole, with settled gains; whole, carrying the covariance; and one call per predict and
+//! update (sizes known at run time, gate included); against the same equations written by hand with statically sized nalgebra matrices on
+//! the same data. And the exact expectation of a mismatched filter. `KFDESIGN_BENCH_DATA` names a folder with `rate_1e6.f64` and
+//! `angle_1e6.f64` (see `peers.py`) to run on as well.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -8,12 +9,13 @@ use std::time::Instant;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use kfdesign::filter::gains::GainSequence;
 use kfdesign::filter::mismatch::expect;
+use kfdesign::filter::whole_log::{carried, innovations};
 use kfdesign::filter::{Judge, Kalman};
-use kfdesign::model::{InitialBias, LinearModel, sensor_errors};
+use kfdesign::model::{InitialBias, LinearModel, Named, sensor_errors};
 use kfdesign::noise::{NoiseModel, Term};
 use kfdesign::numerics::random::{StreamId, fill_normal, stream};
 use kfdesign::units::Quantity;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 const STEPS: usize = 100_000;
 /// Steps timed at once, short enough to fall between the interruptions of a busy machine; the best of all rounds counts.
@@ -38,17 +40,17 @@ fn measurements(model: &LinearModel) -> Vec<f64> {
 
 fn ours(model: &LinearModel, z: &[f64]) -> f64 {
     let mut kalman = Kalman::new(model);
-    let mut log_likelihood = kalman.update(0, z[0], None).log_likelihood;
+    let mut log_likelihood = kalman.update(0, z[0], None).log_likelihood();
     for z in &z[1..] {
         kalman.predict();
-        log_likelihood += kalman.update(0, *z, None).log_likelihood;
+        log_likelihood += kalman.update(0, *z, None).log_likelihood();
     }
     log_likelihood
 }
 
 /// The textbook in nalgebra: sizes fixed at compile time, Joseph form, log-likelihood.
 fn by_hand<const N: usize>(model: &LinearModel, z: &[f64]) -> f64 {
-    let square = |a: &nalgebra::DMatrix<f64>| SMatrix::<f64, N, N>::from_fn(|i, j| a[(i, j)]);
+    let square = |a: &DMatrix<f64>| SMatrix::<f64, N, N>::from_fn(|i, j| a[(i, j)]);
     let (f, q, mut p) = (square(&model.f), square(&model.q), square(&model.p0));
     let h = SMatrix::<f64, 1, N>::from_fn(|_, j| model.h[(0, j)]);
     let r = model.r[(0, 0)];
@@ -100,8 +102,14 @@ fn compare<const N: usize>(criterion: &mut Criterion) {
     group.bench_function("Kalman", |bench| bench.iter(|| ours(&model, black_box(&z))));
     group.bench_function("by hand, SMatrix", |bench| bench.iter(|| by_hand::<N>(&model, black_box(&z))));
     group.finish();
-    let (ours, hand) = best(&z, |z| ours(&model, z), |z| by_hand::<N>(&model, z));
-    println!("{N} states: Kalman {ours:.1} ns/step, by hand {hand:.1} ns/step, ratio {:.2}\n", ours / hand);
+    let (calls, hand) = best(&z, |z| ours(&model, z), |z| by_hand::<N>(&model, z));
+    println!("{N} states: Kalman {calls:.1} ns/step, by hand {hand:.1} ns/step, ratio {:.2}\n", calls / hand);
+    let (mut v, mut weight) = (vec![0.0; ROUND], vec![0.0; ROUND]);
+    let (whole, hand) = best(&z, |z| carried(&model, z, &mut v, &mut weight), |z| by_hand::<N>(&model, z));
+    println!(
+        "{N} states: covariance carried {whole:.1} ns/step, by hand {hand:.1} ns/step, ratio {:.2}\n",
+        whole / hand
+    );
 }
 
 fn gap(criterion: &mut Criterion) {
@@ -134,5 +142,62 @@ fn expectation(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, compare::<2>, compare::<3>, gap, expectation);
+/// White rate noise, a constant bias and a Gauss-Markov drift, deg/s: the rate measured, or the angle.
+fn peers_model(states: usize) -> LinearModel {
+    let (dt, density, sigma, tc, bias) = (0.01_f64, 0.0035_f64, 0.002_f64, 100.0_f64, 0.1_f64);
+    let phi = (-dt / tc).exp();
+    let drive = sigma * sigma * (1.0 - phi * phi);
+    let named = |name: &str| Named { name: name.into(), unit: "deg/s".into() };
+    let diagonal = |values: &[f64]| DMatrix::from_diagonal(&DVector::from_column_slice(values));
+    let (f, h, q, r, p0) = if states == 2 {
+        let p0 = diagonal(&[bias * bias, sigma * sigma]);
+        (diagonal(&[1.0, phi]), vec![1.0, 1.0], diagonal(&[0.0, drive]), density * density / dt, p0)
+    } else {
+        let f = DMatrix::from_row_slice(3, 3, &[1.0, dt, dt, 0.0, 1.0, 0.0, 0.0, 0.0, phi]);
+        let p0 = diagonal(&[1.0, bias * bias, sigma * sigma]);
+        (f, vec![1.0, 0.0, 0.0], diagonal(&[density * density * dt, 0.0, drive]), 1e-4, p0)
+    };
+    LinearModel {
+        dt,
+        states: (0..states).map(|i| named(&format!("x{i}"))).collect(),
+        inputs: vec![],
+        measurements: vec![named("z")],
+        every: vec![1],
+        outputs: vec![],
+        g: DMatrix::zeros(states, 0),
+        h: DMatrix::from_row_slice(1, states, &h),
+        r: DMatrix::from_element(1, 1, r),
+        x0: DVector::zeros(states),
+        f,
+        q,
+        p0,
+    }
+}
+
+/// The whole road on the peers' data: 10⁶ samples, innovations, NIS and likelihood.
+#[allow(clippy::print_stdout, reason = "the ratio is what the bench is for")]
+fn whole_logs(_: &mut Criterion) {
+    let Ok(folder) = std::env::var("KFDESIGN_BENCH_DATA") else { return };
+    for (states, file, road) in [(2, "rate_1e6.f64", "filter"), (3, "angle_1e6.f64", "filter3")] {
+        let bytes = std::fs::read(format!("{folder}/{file}")).expect("the peers' data");
+        let z: Vec<f64> = bytes.as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
+        let model = peers_model(states);
+        let (mut v, mut nis) = (vec![0.0; z.len()], vec![0.0; z.len()]);
+        let mut best = [f64::INFINITY; 3];
+        for _ in 0..15 {
+            let mut by = |which: usize, work: &mut dyn FnMut() -> f64| {
+                let start = Instant::now();
+                black_box(work());
+                best[which] = best[which].min(start.elapsed().as_secs_f64());
+            };
+            by(0, &mut || innovations(&model, &z, &mut v, &mut nis));
+            by(1, &mut || carried(&model, &z, &mut v, &mut nis));
+            by(2, &mut || if states == 2 { by_hand::<2>(&model, &z) } else { by_hand::<3>(&model, &z) });
+        }
+        let [settled, carried, hand] = best;
+        println!("peers: {road} {settled} s; covariance carried {carried} s, nalgebra by hand {hand} s\n");
+    }
+}
+
+criterion_group!(benches, compare::<2>, compare::<3>, whole_logs, gap, expectation);
 criterion_main!(benches);

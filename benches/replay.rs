@@ -105,7 +105,7 @@ fn bench(criterion: &mut Criterion) {
                         if i + k > 0 {
                             kalman.predict();
                         }
-                        total += kalman.update(0, *z, None).log_likelihood;
+                        total += kalman.update(0, *z, None).log_likelihood();
                     }
                 }
             }

@@ -8,6 +8,7 @@ mod single;
 mod smoother;
 mod square_root;
 mod steady_state;
+mod whole_log;
 
 use kfdesign::model::{LinearModel, Named};
 use nalgebra::{DMatrix, DVector};

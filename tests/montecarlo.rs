@@ -1,6 +1,7 @@
 //! `kfdesign montecarlo` and `kfdesign merge`: the same document however its runs were come by, refusals, truths, closed forms.
 
 mod closed_forms;
+mod every_step;
 mod refused;
 mod shards;
 mod truths;

@@ -1,6 +1,7 @@
 //! `kfdesign montecarlo` and `kfdesign merge`.
 
 mod sight;
+mod tables;
 mod text;
 
 use std::borrow::Cow;
@@ -18,11 +19,12 @@ use super::Status;
 use super::flags::with_unit;
 use super::output::{digits, print_text, progress};
 use crate::consistency::Verdict;
-use crate::export::{atomic, junit, table::TableWriter};
+use crate::export::{atomic, junit};
 use crate::filter::FilterDesign;
 use crate::montecarlo::calibration::{self, MAX_REPLICATES, MAX_RUN, REPLICATES};
 use crate::montecarlo::course::{MAX_STEPS, MIN_STEPS};
 use crate::montecarlo::document::{self, Shard};
+use crate::montecarlo::every_step::MAX_EVERY_STEP;
 use crate::montecarlo::gate::Gate;
 use crate::montecarlo::power::{self, Mistuning};
 use crate::montecarlo::{Course, Experiment, Outcome, Runs, Totals, conclude};
@@ -68,6 +70,9 @@ pub struct Args {
     /// Simulate this run alone; -o takes its numbers (.csv, .csv.gz or .npy)
     #[arg(long, value_name = "NUMBER", conflicts_with_all = ["runs", "resume", "replicates", "json", "junit", "report", "power", "plan", "confirm"])]
     run: Option<u64>,
+    /// Average NEES and NIS at every step, as a table (.csv, .csv.gz or .npy)
+    #[arg(long, value_name = "FILE", conflicts_with = "run")]
+    every_step: Option<PathBuf>,
     /// Go on from what -o FILE holds of the same experiment
     #[arg(long, requires = "output")]
     resume: bool,
@@ -119,6 +124,10 @@ struct Outputs {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let inputs: Vec<&Path> = std::iter::once(args.filter.as_path()).chain(args.truth.as_deref()).collect();
+    if let Some(path) = &args.every_step {
+        args.outputs.check(&[path])?;
+        inputs.iter().try_for_each(|input| atomic::check_output(path, input))?;
+    }
     args.outputs.check(&inputs)?;
     let design = FilterDesign::read(&args.filter)?;
     let truth = args.truth.as_deref().map(Params::read).transpose()?;
@@ -155,7 +164,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     pool.install(|| {
         let course = experiment.course().with_context(|| args.filter.display().to_string())?;
         match args.run {
-            Some(number) => one_run(args, &experiment, &course, number),
+            Some(number) => tables::one_run(args, &experiment, &course, number),
             None => many_runs(args, &experiment, &course),
         }
     })
@@ -181,6 +190,12 @@ fn many_runs(args: &Args, experiment: &Experiment, course: &Course) -> anyhow::R
         bail!("--runs {}: one run judges nothing; expected at least 2", args.runs);
     }
     args.outputs.check_plans(experiment)?;
+    if args.every_step.is_some() && course.steps > MAX_EVERY_STEP {
+        bail!(
+            "--every-step: a run has {} samples, expected at most {MAX_EVERY_STEP}; shorten --duration",
+            course.steps
+        );
+    }
     let (start, mut next) = match args.outputs.output.as_deref().filter(|path| args.resume && path.exists()) {
         None => (None, runs.start),
         Some(path) => {
@@ -249,6 +264,9 @@ fn many_runs(args: &Args, experiment: &Experiment, course: &Course) -> anyhow::R
     let truth = args.truth.iter().map(|path| ("truth's parameters".to_string(), path.display().to_string()));
     let filter = std::iter::once(("filter".to_string(), args.filter.display().to_string()));
     let sources: Vec<_> = filter.chain(truth).collect();
+    if let Some(path) = &args.every_step {
+        tables::every_step(path, course, runs.clone())?;
+    }
     args.outputs.finish(experiment, course, &totals, runs, &sources)
 }
 
@@ -273,50 +291,6 @@ pub(super) fn merge(args: &MergeArgs) -> anyhow::Result<Status> {
 /// Whether a file is or will be at this place that can be written again: no device, no pipe.
 fn is_ordinary(path: &Path) -> bool {
     path.is_file() || !path.exists()
-}
-
-/// One run alone, as a table.
-fn one_run(args: &Args, experiment: &Experiment, course: &Course, number: u64) -> anyhow::Result<Status> {
-    let Some(path) = &args.outputs.output else {
-        bail!("--run {number} needs -o FILE for its numbers (.csv, .csv.gz or .npy)")
-    };
-    let traces = course.trace(number);
-    let time: Vec<f64> = (0..course.steps).map(|step| step as f64 * course.dt).collect();
-    let unit = experiment.design.quantity.si_unit();
-    let mut header = vec!["time (s)".to_string()];
-    let mut columns = vec![time.as_slice()];
-    for (axis, trace) in course.axes.iter().zip(&traces) {
-        let name = &axis.name;
-        for (states, kind, values) in
-            [(&axis.truth.states, "true", &trace.truth), (&axis.filter.states, "estimated", &trace.estimate)]
-        {
-            header.extend(states.iter().map(|s| format!("{name}_{}_{kind} ({})", s.name, s.unit)));
-            columns.extend(values.iter().map(Vec::as_slice));
-        }
-        for (i, channel) in axis.channels.iter().enumerate() {
-            let (place, own) = if axis.channels.len() == 1 {
-                (name.clone(), unit.to_string())
-            } else {
-                (format!("{name}_{}", channel.name), axis.filter.measurements[i].unit.clone())
-            };
-            let names = ["measured", "innovation"].map(|what| format!("{place}_{what} ({own})"));
-            header.extend(names.into_iter().chain([format!("{place}_innovation_normalised")]));
-            columns.extend([&trace.measured[i], &trace.innovation[i], &trace.normalised[i]].map(Vec::as_slice));
-        }
-    }
-    let mut writer = TableWriter::create(path, &header)?;
-    writer.write(&columns)?;
-    writer.finish()?;
-    if !args.outputs.json {
-        print_text(&format!(
-            "run {number} (seed {}): {} samples of {} s in {}\n",
-            course.seed,
-            course.steps,
-            digits(course.dt),
-            path.display()
-        ))?;
-    }
-    Ok(Status::Done)
 }
 
 impl Outputs {

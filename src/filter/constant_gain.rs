@@ -70,14 +70,11 @@ impl ConstantGain {
     pub fn update(&mut self, index: usize, z: f64, gate: Option<f64>) -> Update {
         let (gain, variance) = &self.gains[index];
         let innovation = z - self.h.row(index).transpose().dot(&self.kalman.x);
-        let nis = innovation * innovation / variance;
-        let log_likelihood = -0.5 * ((std::f64::consts::TAU * variance).ln() + nis);
-        let accepted =
-            log_likelihood.is_finite() && innovation.abs() <= gate.unwrap_or(f64::INFINITY) * variance.sqrt();
-        if accepted {
+        let update = Update::new(innovation, *variance, gate.unwrap_or(f64::INFINITY));
+        if update.accepted {
             self.kalman.x.axpy(innovation, gain, 1.0);
         }
-        Update { innovation, variance: *variance, nis, log_likelihood, accepted }
+        update
     }
 
     /// As [`Kalman::nudge`].

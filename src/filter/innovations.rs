@@ -102,7 +102,7 @@ pub fn log_likelihoods(models: &[LinearModel], log: &SensorLog, rows: usize) -> 
     }
     let one_by_one = |model: &LinearModel| {
         let mut sum = 0.0;
-        run(model, log, rows, |_, _, update| sum += update.log_likelihood);
+        run(model, log, rows, |_, _, update| sum += update.log_likelihood());
         sum
     };
     models.par_iter().map(one_by_one).collect()

@@ -19,10 +19,23 @@ pub struct Update {
     pub variance: f64,
     /// ν²/S.
     pub nis: f64,
-    /// −½ (ln 2πS + ν²/S).
-    pub log_likelihood: f64,
     /// False when it was gated out or not a finite number (the state was not changed).
     pub accepted: bool,
+}
+
+impl Update {
+    /// −½ (ln 2πS + ν²/S).
+    pub fn log_likelihood(&self) -> f64 {
+        -0.5 * ((std::f64::consts::TAU * self.variance).ln() + self.nis)
+    }
+
+    /// ν and S of a measurement, which can be used when both are numbers, S > 0 and |ν| ≤ gate·√S.
+    #[inline(always)]
+    pub fn new(innovation: f64, variance: f64, gate: f64) -> Update {
+        let nis = innovation * innovation * (1.0 / variance);
+        let sound = variance > 0.0 && variance.is_finite() && nis.is_finite();
+        Update { innovation, variance, nis, accepted: sound && nis <= gate * gate }
+    }
 }
 
 /// State of a running filter.
@@ -87,13 +100,20 @@ impl Kalman {
     }
 
     /// x ← F x, P ← F P Fᵀ + Q.
+    #[inline]
     pub fn predict(&mut self) {
         let Scratch { vector, matrix, .. } = &mut self.scratch;
         let (f, q) = (self.f.as_slice(), self.q.as_slice());
         let (x, p) = (self.x.as_mut_slice(), self.p.as_mut_slice());
-        match &self.sparse {
-            Some(sparse) => sparse.predict(q, x, p, vector, matrix),
-            None => for_size!(x.len(), predict_kernel(f, q, x, p, vector, matrix)),
+        match (x.len(), &self.sparse) {
+            (1, _) => predict_slices::<1>(f, q, x, p),
+            (2, _) => predict_slices::<2>(f, q, x, p),
+            (3, _) => predict_slices::<3>(f, q, x, p),
+            (4, _) => predict_slices::<4>(f, q, x, p),
+            (5, _) => predict_slices::<5>(f, q, x, p),
+            (6, _) => predict_slices::<6>(f, q, x, p),
+            (_, Some(sparse)) => sparse.predict(q, x, p, vector, matrix),
+            (n, None) => predict_kernel(n, f, q, x, p, vector, matrix),
         }
     }
 
@@ -150,6 +170,7 @@ impl Kalman {
     /// S = h P hᵀ + r, K = P hᵀ/S, x ← x + K ν, P ← (I − K h) P (I − K h)ᵀ + K r Kᵀ.
     /// A measurement or variance that is not a finite number changes nothing and is reported as not accepted.
     /// Source: Bucy and Joseph 1968 (the form that stays definite for any gain).
+    #[inline]
     pub fn update(&mut self, index: usize, z: f64, gate: Option<f64>) -> Update {
         let n = self.x.len();
         let measurement = Measurement {
@@ -160,7 +181,15 @@ impl Kalman {
         };
         let Scratch { vector, matrix, .. } = &mut self.scratch;
         let (x, p) = (self.x.as_mut_slice(), self.p.as_mut_slice());
-        for_size!(n, update_kernel(&measurement, x, p, vector, matrix))
+        match n {
+            1 => update_slices::<1>(&measurement, x, p),
+            2 => update_slices::<2>(&measurement, x, p),
+            3 => update_slices::<3>(&measurement, x, p),
+            4 => update_slices::<4>(&measurement, x, p),
+            5 => update_slices::<5>(&measurement, x, p),
+            6 => update_slices::<6>(&measurement, x, p),
+            n => update_kernel(n, &measurement, x, p, vector, matrix),
+        }
     }
 }
 
@@ -181,6 +210,121 @@ struct Measurement<'a> {
     r: f64,
     z: f64,
     gate: f64,
+}
+
+/// The first `N` columns of `N` numbers.
+#[inline(always)]
+pub(super) fn square<const N: usize>(numbers: &[f64]) -> [[f64; N]; N] {
+    let columns = &numbers.as_chunks::<N>().0[..N];
+    std::array::from_fn(|j| columns[j])
+}
+
+/// [`predict_kernel`] of a known size, in registers; the same operations in the same order.
+#[inline(always)]
+pub(super) fn predict_fixed<const N: usize>(
+    f: &[[f64; N]; N],
+    q: &[[f64; N]; N],
+    x: &mut [f64; N],
+    p: &mut [[f64; N]; N],
+) {
+    let old = *x;
+    for i in 0..N {
+        let mut sum = 0.0;
+        for k in 0..N {
+            sum += f[k][i] * old[k];
+        }
+        x[i] = sum;
+    }
+    let mut m = [[0.0; N]; N];
+    for j in 0..N {
+        for i in 0..N {
+            for k in 0..N {
+                m[j][i] += f[k][i] * p[j][k];
+            }
+        }
+    }
+    for j in 0..N {
+        for i in j..N {
+            let mut sum = q[j][i];
+            for k in 0..N {
+                sum += m[k][i] * f[k][j];
+            }
+            p[j][i] = sum;
+            p[i][j] = sum;
+        }
+    }
+}
+
+/// [`update_kernel`] of a known size.
+#[inline(always)]
+pub(super) fn update_fixed<const N: usize>(
+    h: &[f64; N],
+    r: f64,
+    z: f64,
+    gate: f64,
+    x: &mut [f64; N],
+    p: &mut [[f64; N]; N],
+) -> Update {
+    let mut v = [0.0; N]; // P hᵀ
+    let (mut predicted, mut variance) = (0.0, r);
+    for i in 0..N {
+        for k in 0..N {
+            v[i] += p[k][i] * h[k];
+        }
+        predicted += h[i] * x[i];
+        variance += h[i] * v[i];
+    }
+    let update = Update::new(z - predicted, variance, gate);
+    if !update.accepted {
+        return update;
+    }
+    let weight = 1.0 / variance;
+    let gain = v.map(|v| v * weight);
+    for i in 0..N {
+        x[i] += gain[i] * update.innovation;
+    }
+    let mut t = [[0.0; N]; N];
+    for j in 0..N {
+        let mut h_p = 0.0;
+        for i in 0..N {
+            h_p += h[i] * p[j][i];
+        }
+        for i in 0..N {
+            t[j][i] = p[j][i] - gain[i] * h_p;
+        }
+    }
+    for i in 0..N {
+        let mut t_h = 0.0;
+        for j in 0..N {
+            t_h += t[j][i] * h[j];
+        }
+        for j in 0..=i {
+            let value = t[j][i] - t_h * gain[j] + gain[i] * r * gain[j];
+            p[j][i] = value;
+            p[i][j] = value;
+        }
+    }
+    update
+}
+
+#[inline(always)]
+fn predict_slices<const N: usize>(f: &[f64], q: &[f64], x: &mut [f64], p: &mut [f64]) {
+    let (mut state, mut covariance) = (std::array::from_fn(|i| x[i]), square::<N>(p));
+    predict_fixed(&square(f), &square(q), &mut state, &mut covariance);
+    x.copy_from_slice(&state);
+    p.copy_from_slice(covariance.as_flattened());
+}
+
+#[inline(always)]
+fn update_slices<const N: usize>(measurement: &Measurement<'_>, x: &mut [f64], p: &mut [f64]) -> Update {
+    let h: [f64; N] = std::array::from_fn(|i| measurement.h[i]);
+    let (mut state, mut covariance) = (std::array::from_fn(|i| x[i]), square::<N>(p));
+    let update = update_fixed(&h, measurement.r, measurement.z, measurement.gate, &mut state, &mut covariance);
+    if update.accepted {
+        x.copy_from_slice(&state);
+        p.copy_from_slice(covariance.as_flattened());
+    }
+    update
 }
 
 /// x ← F x, P ← F P Fᵀ + Q; F, Q, P by columns. Only one triangle of P is computed, so it stays exactly symmetric.
@@ -241,17 +385,16 @@ fn update_kernel(
         variance += h[i] * sum;
     }
     let innovation = z - predicted;
-    let nis = innovation * innovation / variance;
-    let log_likelihood = -0.5 * ((std::f64::consts::TAU * variance).ln() + nis);
-    let accepted = log_likelihood.is_finite() && innovation.abs() <= gate * variance.sqrt();
-    if accepted {
+    let update = Update::new(innovation, variance, gate);
+    if update.accepted {
+        let weight = 1.0 / variance;
         for i in 0..n {
-            v[i] /= variance; // K
+            v[i] *= weight; // K
             x[i] += v[i] * innovation;
         }
         joseph(n, v, h, r, p, m);
     }
-    Update { innovation, variance, nis, log_likelihood, accepted }
+    update
 }
 
 /// P ← (I − K h) P (I − K h)ᵀ + K r Kᵀ with T = (I − K h) P formed first: n² work for a scalar measurement.

@@ -33,6 +33,7 @@ pub mod smoother;
 pub mod square_root;
 pub mod steady_state;
 mod transition;
+pub mod whole_log;
 
 pub use attitude::{AttitudeDesign, AttitudeModel};
 pub use constant_gain::ConstantGain;

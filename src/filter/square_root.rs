@@ -100,10 +100,8 @@ impl<T: RealField + Copy> SquareRoot<T> {
         let step: T = convert::<f64, T>(z) - predicted;
         let (innovation, wide): (f64, f64) = (convert_unchecked(step), convert_unchecked(root));
         let variance = wide * wide;
-        let nis = innovation * innovation / variance;
-        let log_likelihood = -0.5 * ((std::f64::consts::TAU * variance).ln() + nis);
-        let accepted = log_likelihood.is_finite() && innovation.abs() <= gate.unwrap_or(f64::INFINITY) * wide.abs();
-        if accepted {
+        let update = Update::new(innovation, variance, gate.unwrap_or(f64::INFINITY));
+        if update.accepted {
             for i in 0..n {
                 self.x[i] += self.square[(0, i + 1)] / root * step;
                 for j in 0..=i {
@@ -111,7 +109,7 @@ impl<T: RealField + Copy> SquareRoot<T> {
                 }
             }
         }
-        Update { innovation, variance, nis, log_likelihood, accepted }
+        update
     }
 
     /// As [`Kalman::nudge`].

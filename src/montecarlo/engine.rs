@@ -5,7 +5,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::course::AxisCourse;
-use super::lanes::{Blind, LANES, Lane, Observer, Scratch, Truth, simulate};
+use super::lanes::{LANES, Lane, Observer, Scratch, Truth, simulate};
 use super::sums::Totals;
 
 /// Steps (of all runs and axes) between two looks at the clock and at a request to stop.
@@ -45,7 +45,7 @@ impl Course {
             })
     }
 
-    /// Up to four runs of one axis.
+    /// Up to eight runs of one axis.
     fn group(
         &self,
         number: u32,
@@ -55,16 +55,22 @@ impl Course {
         scratch: &mut Option<Scratch>,
         progress: &(dyn Fn(u64) + Sync),
     ) {
-        let axis = &self.axes[number as usize];
-        let scratch = scratch.get_or_insert_with(|| Scratch::new(axis));
-        let numbers: [u64; LANES] = std::array::from_fn(|l| first.saturating_add(l as u64));
-        let drawn = self.drawn(number, numbers);
-        simulate(axis, number, drawn.as_ref().unwrap_or(&axis.nominal), self.seed, numbers, scratch, &mut Blind);
+        let scratch = scratch.get_or_insert_with(|| Scratch::new(&self.axes[number as usize]));
+        self.runs_of(number, first, scratch);
         let used = (runs.end - first).min(LANES as u64);
         for (values, counts) in scratch.values.iter().zip(&scratch.counts).take(used as usize) {
             totals.add(values, counts);
         }
         progress(used);
+    }
+
+    /// The eight runs from `first` on, of one axis.
+    pub(super) fn runs_of(&self, number: u32, first: u64, scratch: &mut Scratch) {
+        let axis = &self.axes[number as usize];
+        let numbers: [u64; LANES] = std::array::from_fn(|l| first.saturating_add(l as u64));
+        let drawn = self.drawn(number, numbers);
+        let truth = drawn.as_ref().unwrap_or(&axis.nominal);
+        simulate(axis, number, truth, self.seed, numbers, scratch, None);
     }
 
     /// The truths of these runs, where every run has its own.
@@ -107,20 +113,20 @@ impl Course {
             let numbers = [run; LANES];
             let drawn = self.drawn(number, numbers);
             let truth = drawn.as_ref().unwrap_or(&axis.nominal);
-            simulate(axis, number, truth, self.seed, numbers, &mut Scratch::new(axis), &mut trace);
+            simulate(axis, number, truth, self.seed, numbers, &mut Scratch::new(axis), Some(&mut trace));
             trace
         };
         (0..).zip(&self.axes).map(|(number, axis)| one(number, axis)).collect()
     }
 
-    /// Four runs, `first` and those after it, at every `every`-th step: what a figure needs, however long a run is. By axis, then by run.
+    /// Eight runs, `first` and those after it, at every `every`-th step: what a figure needs, however long a run is. By axis, then by run.
     pub fn paths(&self, first: u64, every: u64) -> Vec<Vec<Path>> {
         let one = |number: u32, axis: &AxisCourse| {
             let mut paths = Paths { every: every.max(1), runs: std::array::from_fn(|_| Path::new(axis)) };
             let numbers: [u64; LANES] = std::array::from_fn(|l| first.saturating_add(l as u64));
             let drawn = self.drawn(number, numbers);
             let truth = drawn.as_ref().unwrap_or(&axis.nominal);
-            simulate(axis, number, truth, self.seed, numbers, &mut Scratch::new(axis), &mut paths);
+            simulate(axis, number, truth, self.seed, numbers, &mut Scratch::new(axis), Some(&mut paths));
             Vec::from(paths.runs)
         };
         (0..).zip(&self.axes).map(|(number, axis)| one(number, axis)).collect()

@@ -1,27 +1,83 @@
-//! Runs side by side: four at a time go through the same gains, so that one instruction serves several runs.
+//! Runs side by side: eight at a time go through the same gains, so that one instruction serves several runs.
 //!
 //! Lanes never mix: the numbers of a run do not depend on which runs are beside it.
 
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
-use rand::rngs::ChaCha8Rng;
+use pulp::Arch;
 use realfft::num_complex::Complex;
 use realfft::{RealFftPlanner, RealToComplex};
 
-use super::course::{AxisCourse, Channel};
-use super::sums::{Layout, NIS_BIN, NIS_BINS};
+use super::course::{AxisCourse, Channel, EpochCourse};
+use super::every_step::Judged;
+use super::kernels::{Absorb, Draw, Stretch};
+use super::sums::{Layout, NIS_BINS};
 use crate::model::LinearModel;
 use crate::numerics::linalg::cholesky_semidefinite;
-use crate::numerics::random::{StreamId, fill_normal, normal, stream};
+use crate::numerics::normals::Normals;
+use crate::numerics::random::StreamId;
 
 /// Runs side by side.
-pub(super) const LANES: usize = 4;
+pub(super) const LANES: usize = 8;
 /// One number of each run.
 pub(super) type Lane = [f64; LANES];
 
+/// Lanes in memory that starts at a cache line, so that a register of a whole lane never crosses two.
+#[derive(Clone, Debug)]
+pub(super) struct Aligned {
+    numbers: Vec<f64>,
+    /// Numbers before the first lane.
+    offset: usize,
+    length: usize,
+}
+
+impl Aligned {
+    /// Room for so many lanes; empty.
+    fn new(capacity: usize) -> Aligned {
+        let numbers = vec![0.0; (capacity + 1) * LANES];
+        // where a platform cannot say, lanes are right but slower
+        let offset = numbers.as_ptr().align_offset(size_of::<Lane>());
+        Aligned { numbers, offset: if offset < LANES { offset } else { 0 }, length: 0 }
+    }
+    pub(super) fn len(&self) -> usize {
+        self.length
+    }
+    #[inline(always)]
+    pub(super) fn lanes(&self) -> &[Lane] {
+        &self.numbers[self.offset..].as_chunks().0[..self.length]
+    }
+    #[inline(always)]
+    pub(super) fn lanes_mut(&mut self) -> &mut [Lane] {
+        &mut self.numbers[self.offset..].as_chunks_mut().0[..self.length]
+    }
+    /// So many lanes more, zero; beyond the capacity there are none.
+    #[inline(always)]
+    pub(super) fn grow(&mut self, count: usize) {
+        let from = self.length;
+        self.length = (from + count).min(self.numbers.len() / LANES - 1);
+        self.lanes_mut()[from..].fill([0.0; LANES]);
+    }
+    #[inline(always)]
+    pub(super) fn push(&mut self, lane: Lane) {
+        self.grow(1);
+        if let Some(last) = self.lanes_mut().last_mut() {
+            *last = lane;
+        }
+    }
+    pub(super) fn clear(&mut self) {
+        self.length = 0;
+    }
+    #[inline(always)]
+    pub(super) fn keep_last(&mut self, count: usize) {
+        let from = self.length - count;
+        self.lanes_mut().copy_within(from.., 0);
+        self.length = count;
+    }
+}
+
 /// Steps whose random numbers are drawn at once.
-const CHUNK: usize = 256;
+pub(super) const CHUNK: usize = 256;
 
 /// Term part of the stream addresses of an experiment, beside those of [`crate::simulate`]: initial state, process noise of column i of
 /// the root of Q, noise of measurement i, and the drawn parameters of `--truth-spread`.
@@ -31,26 +87,26 @@ const MEASUREMENT: u32 = 0x12_0000;
 pub(super) const PARAMETERS: u32 = 0x13_0000;
 
 /// Entries of a matrix that are not zero in some lane: (row, column, values).
-type Entries<T> = Vec<(usize, usize, T)>;
+pub(super) type Entries<T> = Vec<(usize, usize, T)>;
 
 /// The truth as the inner loop wants it, one model per lane.
 #[derive(Clone, Debug)]
 pub(super) struct Truth {
-    x0: Vec<Lane>,
-    f: Transition<Lane>,
-    h: Vec<Vec<Lane>>,
+    pub(super) x0: Vec<Lane>,
+    pub(super) f: Transition<Lane>,
+    pub(super) h: Vec<Vec<Lane>>,
     /// Columns of the roots of P0 and Q: (row, value).
     start: Vec<Vec<(usize, Lane)>>,
-    process: Vec<Vec<(usize, Lane)>>,
-    root_r: Vec<Lane>,
+    pub(super) process: Vec<Vec<(usize, Lane)>>,
+    pub(super) root_r: Vec<Lane>,
 }
 
 /// x ← F x.
 #[derive(Clone, Debug)]
-struct Transition<T> {
+pub(super) struct Transition<T> {
     /// Set when F is diagonal.
-    diagonal: Vec<T>,
-    entries: Entries<T>,
+    pub(super) diagonal: Vec<T>,
+    pub(super) entries: Entries<T>,
 }
 
 impl Truth {
@@ -96,63 +152,40 @@ impl<T: Copy> Transition<T> {
     }
 }
 
-impl Transition<Lane> {
-    fn apply(&self, x: &mut [Lane], scratch: &mut [Lane]) {
-        if self.diagonal.len() == x.len() {
-            for (x, f) in x.iter_mut().zip(&self.diagonal) {
-                for l in 0..LANES {
-                    x[l] *= f[l];
-                }
-            }
-            return;
-        }
-        scratch.fill([0.0; LANES]);
-        for (i, j, f) in &self.entries {
-            for l in 0..LANES {
-                scratch[*i][l] += f[l] * x[*j][l];
-            }
-        }
-        x.copy_from_slice(&scratch[..x.len()]);
-    }
-}
-
 /// Sees every number of a run; the engine does not look.
 pub(super) trait Observer {
     fn step(&mut self, _step: u64, _truth: &[Lane], _estimate: &[Lane]) {}
     fn update(&mut self, _channel: usize, _measured: &Lane, _innovation: &Lane, _normalised: &Lane) {}
 }
 
-/// Looks at nothing.
-pub(super) struct Blind;
-impl Observer for Blind {}
-
 /// Memory of a worker: taken once for an axis.
 pub(super) struct Scratch {
-    truth: Vec<Lane>,
-    estimate: Vec<Lane>,
-    spare: Vec<Lane>,
-    f: Transition<Lane>,
-    h: Vec<Vec<f64>>,
-    process: Vec<Vec<Lane>>,
-    noise: Vec<Vec<Lane>>,
-    draws: Vec<f64>,
-    channels: Vec<ChannelSums>,
+    pub(super) truth: Vec<Lane>,
+    pub(super) estimate: Vec<Lane>,
+    pub(super) spare: Vec<Lane>,
+    pub(super) f: Transition<Lane>,
+    pub(super) h: Vec<Vec<f64>>,
+    pub(super) process: Vec<Source>,
+    pub(super) noise: Vec<Source>,
+    pub(super) channels: Vec<ChannelSums>,
+    /// What every step is judged by, when it is wanted.
+    pub(super) judged: Option<Judged>,
     /// Results of each lane, by the [`Layout`].
     pub(super) values: [Vec<f64>; LANES],
     pub(super) counts: [Vec<u32>; LANES],
 }
 
 /// Running sums of one measurement's innovations.
-struct ChannelSums {
+pub(super) struct ChannelSums {
     /// The last `lags` normalised innovations, then those of this chunk.
-    y: Vec<Lane>,
-    lags: usize,
-    sum: Lane,
-    squares: Lane,
-    products: Vec<Lane>,
-    block: Lane,
-    filled: u64,
-    blocks: Vec<Lane>,
+    pub(super) y: Aligned,
+    pub(super) lags: usize,
+    pub(super) sum: Lane,
+    pub(super) squares: Lane,
+    pub(super) products: Vec<Lane>,
+    pub(super) block: Lane,
+    pub(super) filled: u64,
+    pub(super) blocks: Vec<Lane>,
     fft: Arc<dyn RealToComplex<f64>>,
     series: Vec<f64>,
     spectrum: Vec<Complex<f64>>,
@@ -163,7 +196,7 @@ impl ChannelSums {
     fn new(channel: &Channel) -> ChannelSums {
         let fft = RealFftPlanner::new().plan_fft_forward(channel.blocks);
         ChannelSums {
-            y: Vec::with_capacity(channel.lags + CHUNK),
+            y: Aligned::new(channel.lags + CHUNK),
             lags: channel.lags,
             sum: [0.0; LANES],
             squares: [0.0; LANES],
@@ -180,57 +213,10 @@ impl ChannelSums {
 
     fn start(&mut self) {
         self.y.clear();
-        self.y.resize(self.lags, [0.0; LANES]);
+        self.y.grow(self.lags);
         (self.sum, self.squares, self.block, self.filled) = ([0.0; LANES], [0.0; LANES], [0.0; LANES], 0);
         self.products.fill([0.0; LANES]);
         self.blocks.clear();
-    }
-
-    /// Adds the innovations of a chunk up and keeps the last ones.
-    fn absorb(&mut self, base: u64, histogram: &mut [&mut [u32]; LANES]) {
-        let fresh = &self.y[self.lags..];
-        for y in fresh {
-            for ((sum, squares), y) in self.sum.iter_mut().zip(&mut self.squares).zip(y) {
-                *sum += y;
-                *squares += y * y;
-            }
-        }
-        for (h, product) in self.products.iter_mut().enumerate() {
-            let past = &self.y[self.lags - h - 1..];
-            let mut sum = [0.0; LANES];
-            for (y, p) in fresh.iter().zip(past) {
-                for l in 0..LANES {
-                    sum[l] += y[l] * p[l];
-                }
-            }
-            for l in 0..LANES {
-                product[l] += sum[l];
-            }
-        }
-        for y in fresh {
-            for (counts, y) in histogram.iter_mut().zip(y) {
-                let bin = (y * y / NIS_BIN) as usize;
-                counts[bin.min(NIS_BINS)] += 1;
-            }
-        }
-        let mut rest = fresh;
-        while !rest.is_empty() {
-            let (some, later) = rest.split_at(rest.len().min((base - self.filled) as usize));
-            for y in some {
-                for (block, y) in self.block.iter_mut().zip(y) {
-                    *block += y;
-                }
-            }
-            self.filled += some.len() as u64;
-            if self.filled == base {
-                self.blocks.push(self.block);
-                (self.block, self.filled) = ([0.0; LANES], 0);
-            }
-            rest = later;
-        }
-        let kept = self.y.len() - self.lags;
-        self.y.copy_within(kept.., 0);
-        self.y.truncate(self.lags);
     }
 
     fn finish(&mut self, channel: &Channel, number: usize, layout: &Layout, values: &mut [Vec<f64>; LANES]) {
@@ -276,8 +262,8 @@ impl Scratch {
             f: Transition::new(n, entries([&axis.filter.f; LANES])),
             h: axis.filter.h.row_iter().map(|row| row.iter().copied().collect()).collect(),
             process: Vec::new(),
-            noise: vec![vec![[0.0; LANES]; CHUNK]; axis.channels.len()],
-            draws: vec![0.0; CHUNK],
+            noise: Vec::new(),
+            judged: None,
             channels: axis.channels.iter().map(ChannelSums::new).collect(),
             values: std::array::from_fn(|_| vec![0.0; layout.values]),
             counts: std::array::from_fn(|_| vec![0; layout.counts]),
@@ -285,126 +271,78 @@ impl Scratch {
     }
 }
 
-/// Streams of one source of noise, one per run.
-struct Streams([ChaCha8Rng; LANES]);
+/// One source of noise: the streams of the runs and the numbers of a chunk, one per step (of which a measurement that is not taken at
+/// every step uses some).
+pub(super) struct Source {
+    normals: Normals<LANES>,
+    words: Vec<[u64; LANES]>,
+    pub(super) numbers: Aligned,
+}
 
-impl Streams {
-    fn new(seed: u64, runs: [u64; LANES], axis: u32, term: u32) -> Streams {
-        Streams(runs.map(|run| stream(seed, StreamId { run, axis, term })))
+impl Source {
+    fn new(normals: Normals<LANES>) -> Source {
+        let mut numbers = Aligned::new(CHUNK);
+        numbers.grow(CHUNK);
+        Source { normals, words: vec![[0; LANES]; CHUNK], numbers }
     }
-    fn one(&mut self) -> Lane {
-        self.0.each_mut().map(normal)
-    }
-    fn fill(&mut self, out: &mut [Lane], draws: &mut [f64]) {
-        let draws = &mut draws[..out.len()];
-        for (l, rng) in self.0.iter_mut().enumerate() {
-            fill_normal(rng, draws);
-            for (out, draw) in out.iter_mut().zip(draws.iter()) {
-                out[l] = *draw;
-            }
-        }
+    fn draw(&mut self, arch: Arch) {
+        arch.dispatch(Draw { normals: &mut self.normals, words: &mut self.words, numbers: self.numbers.lanes_mut() });
     }
 }
 
 /// Runs `runs` through the axis; results are in `scratch.values` and `scratch.counts`, one lane per run.
 ///
-/// A run: x(0) ~ N(x0, P0), then z = H x + v, update with the gain of that step, x ← F x + w, and so on.
-pub(super) fn simulate<O: Observer>(
+/// A run: x(0) ~ N(x0, P0), then z = H x + v, update with the gain of that step, x ← F x + w, and so on. The inner loops are compiled for
+/// each instruction set; operations and their order are the same in all, and so are the bits.
+pub(super) fn simulate(
     axis: &AxisCourse,
     number: u32,
     truth: &Truth,
     seed: u64,
     runs: [u64; LANES],
     scratch: &mut Scratch,
-    observer: &mut O,
+    mut observer: Option<&mut dyn Observer>,
 ) {
-    let address = |term| Streams::new(seed, runs, number, term);
-    let mut process: Vec<Streams> = (0..).zip(&truth.process).map(|(i, _)| address(PROCESS + i)).collect();
-    let mut noise: Vec<Streams> = (0..).zip(&axis.channels).map(|(i, _)| address(MEASUREMENT + i)).collect();
-    scratch.process.resize(process.len(), vec![[0.0; LANES]; CHUNK]);
+    let arch = Arch::new();
+    let address = |term| Source::new(Normals::new(seed, runs.map(|run| StreamId { run, axis: number, term })));
+    scratch.process = (0..).zip(&truth.process).map(|(i, _)| address(PROCESS + i)).collect();
+    scratch.noise = (0..).zip(&axis.channels).map(|(i, _)| address(MEASUREMENT + i)).collect();
     scratch.channels.iter_mut().for_each(ChannelSums::start);
     scratch.counts.iter_mut().for_each(|counts| counts.fill(0));
-    let Scratch { truth: x, estimate, spare, f, h, .. } = scratch;
-    x.copy_from_slice(&truth.x0);
+    scratch.truth.copy_from_slice(&truth.x0);
     let mut start = address(START);
-    for column in &truth.start {
-        let draw = start.one();
+    start.draw(arch);
+    for (column, draw) in truth.start.iter().zip(start.numbers.lanes()) {
         for (i, root) in column {
             for l in 0..LANES {
-                x[*i][l] += root[l] * draw[l];
+                scratch.truth[*i][l] += root[l] * draw[l];
             }
         }
     }
-    for (state, x0) in estimate.iter_mut().zip(axis.filter.x0.iter()) {
+    for (state, x0) in scratch.estimate.iter_mut().zip(axis.filter.x0.iter()) {
         *state = [*x0; LANES];
     }
-    let n = axis.gains.states;
-    let mut gains = axis.gains.gains.chunks_exact(n).zip(&axis.gains.weights);
+    let (mut step, mut update) = (0, 0);
     let mut epochs = axis.epochs.iter().enumerate().peekable();
-    let mut step = 0;
     while step < axis.gains.steps {
-        let count = (axis.gains.steps - step).min(CHUNK as u64) as usize;
-        for (streams, buffer) in process.iter_mut().zip(&mut scratch.process) {
-            streams.fill(&mut buffer[..count], &mut scratch.draws);
+        for source in scratch.process.iter_mut().chain(&mut scratch.noise) {
+            source.draw(arch);
         }
-        for ((streams, buffer), channel) in noise.iter_mut().zip(&mut scratch.noise).zip(&axis.channels) {
-            let due = (step + count as u64).div_ceil(channel.every) - step.div_ceil(channel.every);
-            streams.fill(&mut buffer[..due as usize], &mut scratch.draws);
-        }
-        for k in 0..count {
-            if step > 0 {
-                truth.f.apply(x, spare);
-                for (column, draws) in truth.process.iter().zip(&scratch.process) {
-                    let draw = &draws[k];
-                    for (i, root) in column {
-                        for l in 0..LANES {
-                            x[*i][l] += root[l] * draw[l];
-                        }
-                    }
-                }
-                f.apply(estimate, spare);
+        let end = (step + CHUNK as u64).min(axis.gains.steps);
+        while step < end {
+            // up to the next epoch, whose errors are judged
+            let stop = epochs.peek().map_or(end, |(_, epoch)| (epoch.step + 1).min(end));
+            let observer = observer.as_mut().map(|observer| &mut **observer as &mut dyn Observer);
+            update = arch.dispatch(Stretch { axis, truth, scratch, observer, step, stop, update });
+            step = stop;
+            if let Some((i, epoch)) = epochs.next_if(|(_, epoch)| epoch.step + 1 == stop) {
+                judge(epoch, i, &axis.layout, scratch);
             }
-            for (c, channel) in axis.channels.iter().enumerate() {
-                if channel.every != 1 && step % channel.every != 0 {
-                    continue;
-                }
-                let Some((gain, weight)) = gains.next() else { continue };
-                let sums = &mut scratch.channels[c];
-                let draw = &scratch.noise[c][sums.y.len() - sums.lags];
-                let mut z = [0.0; LANES];
-                for (h, x) in truth.h[c].iter().zip(x.iter()) {
-                    for l in 0..LANES {
-                        z[l] += h[l] * x[l];
-                    }
-                }
-                for l in 0..LANES {
-                    z[l] += truth.root_r[c][l] * draw[l];
-                }
-                let mut innovation = z;
-                for (h, x) in h[c].iter().zip(estimate.iter()) {
-                    for l in 0..LANES {
-                        innovation[l] -= h * x[l];
-                    }
-                }
-                for (x, k) in estimate.iter_mut().zip(gain) {
-                    for l in 0..LANES {
-                        x[l] += k * innovation[l];
-                    }
-                }
-                let y = innovation.map(|v| v * weight);
-                sums.y.push(y);
-                observer.update(c, &z, &innovation, &y);
-            }
-            observer.step(step, x, estimate);
-            if let Some((i, epoch)) = epochs.next_if(|(_, epoch)| epoch.step == step) {
-                judge(epoch, i, &axis.layout, x, estimate, &mut scratch.values, &mut scratch.counts);
-            }
-            step += 1;
         }
         for (c, (sums, channel)) in scratch.channels.iter_mut().zip(&axis.channels).enumerate() {
             let place = axis.layout.histogram(c);
-            let mut histogram = scratch.counts.each_mut().map(|counts| &mut counts[place..=place + NIS_BINS]);
-            sums.absorb(channel.base, &mut histogram);
+            let histogram = scratch.counts.each_mut().map(|counts| &mut counts[place..=place + NIS_BINS]);
+            arch.dispatch(Absorb { sums, base: channel.base, histogram });
         }
     }
     for (c, (sums, channel)) in scratch.channels.iter_mut().zip(&axis.channels).enumerate() {
@@ -413,15 +351,8 @@ pub(super) fn simulate<O: Observer>(
 }
 
 /// The errors at an epoch.
-fn judge(
-    epoch: &super::course::EpochCourse,
-    number: usize,
-    layout: &Layout,
-    truth: &[Lane],
-    estimate: &[Lane],
-    values: &mut [Vec<f64>; LANES],
-    counts: &mut [Vec<u32>; LANES],
-) {
+fn judge(epoch: &EpochCourse, number: usize, layout: &Layout, scratch: &mut Scratch) {
+    let Scratch { truth, estimate, values, counts, .. } = scratch;
     let size = epoch.sigma.len();
     for l in 0..LANES {
         let (place, mean, moments) = (layout.epoch(number), layout.mean(number), layout.moments(number));

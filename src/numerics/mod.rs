@@ -4,6 +4,7 @@ pub mod distribution;
 pub mod exact_sum;
 pub mod largest_normal;
 pub mod linalg;
+pub mod normals;
 pub mod quadratic_form;
 pub mod random;
 pub mod reduce;

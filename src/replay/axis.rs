@@ -9,7 +9,8 @@ use crate::consistency::whiteness::Autocorrelation;
 use crate::filter::innovations::nearest_turn;
 use crate::filter::kalman::{Kalman, Update};
 use crate::filter::smoother::History;
-use crate::filter::{AxisDesign, Running};
+use crate::filter::whole_log::TwoStage;
+use crate::filter::{AxisDesign, Form, Running};
 use crate::model::LinearModel;
 use crate::numerics::reduce::Sum;
 
@@ -35,7 +36,26 @@ pub(super) struct AxisReplay {
     pub(super) missing: u64,
     /// For smoothing.
     pub(super) history: Option<History>,
+    /// The same filter for whole stretches of the log, where it can be run so.
+    stretches: Option<Stretches>,
 }
+
+/// A filter for whole stretches, and its results: ν and 1/S of each sample.
+#[derive(Clone, Debug)]
+struct Stretches {
+    filter: TwoStage,
+    innovation: Vec<f64>,
+    weight: Vec<f64>,
+    /// R of the measurement.
+    r: f64,
+    /// Rows that wait for a full stretch.
+    values: Vec<f64>,
+    missing: Vec<u64>,
+    time_s: Vec<f64>,
+}
+
+/// Rows of a stretch: counted from the start of the log, so that the blocks it comes in leave no trace.
+const STRETCH: usize = 4096;
 
 /// One measurement in progress.
 #[derive(Clone, Debug)]
@@ -74,10 +94,19 @@ impl AxisReplay {
     pub(super) fn new(design: &AxisDesign, filter: Running, roles: Roles, options: &Options) -> AxisReplay {
         let model = &design.model;
         let settling = design.steady_state.settling_time / model.dt;
+        let channels: Vec<Channel> = (0..model.measurements.len()).map(|i| Channel::new(design, i)).collect();
+        // what figures show beside the measurement must be what the measurement sees
+        let plain = roles.own == 1 && model.inputs.is_empty() && channels.len() == 1 && !channels[0].angle;
+        let seen = || channels[0].row.iter().eq(channels[0].h.iter());
+        let stretches = (options.form == Form::Joseph && options.gate.is_none() && plain && seen())
+            .then(|| TwoStage::new(model))
+            .flatten()
+            .map(|filter| Stretches::new(filter, model.r[(0, 0)]));
         AxisReplay {
             filter,
             input: None,
-            channels: (0..model.measurements.len()).map(|i| Channel::new(design, i)).collect(),
+            channels,
+            stretches,
             roles,
             gate: options.gate,
             clip: options.clip,
@@ -97,8 +126,70 @@ impl AxisReplay {
         usize::from(self.roles.known_input) + self.channels.len() - self.roles.own
     }
 
+    /// Rows of a sensor alone, when nothing but the statistics is wanted of them; false where they must go one by one.
+    pub(super) fn rows(&mut self, values: &[f64], missing: &[u64], time_s: &[f64]) -> bool {
+        if self.history.is_some() {
+            self.leave_stretches();
+        }
+        let Some(stretches) = &mut self.stretches else { return false };
+        stretches.values.extend(values);
+        stretches.missing.extend(missing);
+        stretches.time_s.extend(time_s);
+        while self.stretches.as_ref().is_some_and(|stretches| stretches.values.len() >= STRETCH) {
+            self.stretch(STRETCH);
+        }
+        true
+    }
+
+    /// The rows that still wait.
+    pub(super) fn flush(&mut self) {
+        if let Some(count) = self.stretches.as_ref().map(|stretches| stretches.values.len()).filter(|count| *count > 0)
+        {
+            self.stretch(count);
+        }
+    }
+
+    /// From here on rows go one by one.
+    fn leave_stretches(&mut self) {
+        self.flush();
+        self.stretches = None;
+    }
+
+    /// The first `count` of the rows that wait.
+    fn stretch(&mut self, count: usize) {
+        let Some(mut stretches) = self.stretches.take() else { return };
+        stretches.run(count, self.started);
+        let Stretches { filter, innovation, weight, r, values, missing, time_s } = &mut stretches;
+        for (row, ((z, missing), time_s)) in
+            values.drain(..count).zip(missing.drain(..count)).zip(time_s.drain(..count)).enumerate()
+        {
+            self.samples += 1;
+            if self.started {
+                self.pass(missing, None);
+            }
+            self.started = true;
+            let channel = &mut self.channels[0];
+            let (v, w) = (innovation[row], weight[row]);
+            if !v.is_finite() {
+                channel.skip();
+                continue;
+            }
+            self.start.update(self.step, 0, z, v, w);
+            // of the state after the update: H x = z − ν R/S, H P Hᵀ = R (1 − R/S)
+            let (estimate, variance) = (z - v * *r * w, *r * (1.0 - *r * w));
+            channel.accept(time_s, z, (estimate, variance.max(0.0).sqrt()), v * w.sqrt());
+        }
+        self.channels[0].log_likelihood = Sum::default();
+        self.channels[0].log_likelihood.add(filter.log_likelihood());
+        if let Running::Joseph(kalman) = &mut self.filter {
+            (kalman.x, kalman.p) = filter.state();
+        }
+        self.stretches = Some(stretches);
+    }
+
     /// One row: the sensor's value, the samples missing before it, and one value per aid.
     pub(super) fn step(&mut self, sensor: f64, missing: u64, time_s: f64, mut aids: impl Iterator<Item = f64>) {
+        self.leave_stretches();
         self.samples += 1;
         if self.started {
             self.advance(missing);
@@ -152,13 +243,9 @@ impl AxisReplay {
         if let Some(history) = &mut self.history {
             history.take(index, z);
         }
-        self.start.update(self.step, index, z, &update);
-        channel.log_likelihood.add(update.log_likelihood);
-        channel.autocorrelation.push(y);
-        channel.low_frequency.push(y);
-        let (estimate, sigma) = self.filter.of_row(&channel.row);
-        channel.trace.push(time_s, z, estimate, sigma, y);
-        channel.nis_histogram[((2.0 * update.nis) as usize).min(NIS_BINS - 1)] += 1;
+        self.start.update(self.step, index, z, update.innovation, 1.0 / update.variance);
+        channel.log_likelihood.add(update.log_likelihood());
+        channel.accept(time_s, z, self.filter.of_row(&channel.row), y);
     }
 
     /// Predictions to the next sample, with `missing` samples in between.
@@ -168,7 +255,13 @@ impl AxisReplay {
         if let Some(history) = &mut self.history {
             history.row(steps, self.input);
         }
-        self.start.predict(steps, self.input);
+        self.pass(missing, self.input);
+    }
+
+    /// What is counted of a step, with `missing` samples in between.
+    fn pass(&mut self, missing: u64, input: Option<f64>) {
+        let steps = missing.saturating_add(1);
+        self.start.predict(steps, input);
         if missing > 0 {
             self.gaps += 1;
             self.missing = self.missing.saturating_add(missing);
@@ -208,6 +301,14 @@ impl Channel {
         }
     }
 
+    /// A measurement that was used: `estimate` and its standard deviation after it, y = ν/√S.
+    fn accept(&mut self, time_s: f64, z: f64, estimate: (f64, f64), y: f64) {
+        self.autocorrelation.push(y);
+        self.low_frequency.push(y);
+        self.trace.push(time_s, z, estimate.0, estimate.1, y);
+        self.nis_histogram[((2.0 * y * y) as usize).min(NIS_BINS - 1)] += 1;
+    }
+
     /// A measured angle, by whole turns nearest to what the filter expects.
     fn nearest(&self, z: f64, x: &DVector<f64>) -> f64 {
         if self.angle { nearest_turn(z, self.h.dot(x)) } else { z }
@@ -216,6 +317,27 @@ impl Channel {
     fn skip(&mut self) {
         self.unusable += 1;
         self.autocorrelation.skip(1);
+    }
+}
+
+impl Stretches {
+    fn new(filter: TwoStage, r: f64) -> Stretches {
+        let (innovation, weight) = (vec![0.0; STRETCH], vec![0.0; STRETCH]);
+        Stretches { filter, innovation, weight, r, values: Vec::new(), missing: Vec::new(), time_s: Vec::new() }
+    }
+
+    fn run(&mut self, count: usize, started: bool) {
+        let (values, missing) = (&self.values[..count], &self.missing[..count]);
+        let mut from = 0;
+        while from < count {
+            let to = missing[from + 1..].iter().position(|n| *n > 0).map_or(count, |n| from + 1 + n);
+            // x0, P0 belong to the first sample that there is
+            if missing[from] > 0 && (started || from > 0) {
+                self.filter.pause(missing[from]);
+            }
+            self.filter.run(&values[from..to], &mut self.innovation[from..to], &mut self.weight[from..to]);
+            from = to;
+        }
     }
 }
 
@@ -239,13 +361,13 @@ impl StartTest {
         }
     }
 
-    /// The same measurement that the filter accepted.
-    fn update(&mut self, step: u64, index: usize, z: f64, update: &Update) {
+    /// The same measurement that the filter accepted; ν and 1/S.
+    fn update(&mut self, step: u64, index: usize, z: f64, innovation: f64, weight: f64) {
         let Some(kalman) = &mut self.shifted else { return };
         // ν of the shifted filter is ν − d
-        let difference = update.innovation - kalman.update(index, z, None).innovation;
-        self.score += difference * update.innovation / update.variance;
-        self.information += difference * difference / update.variance;
+        let difference = innovation - kalman.update(index, z, None).innovation;
+        self.score += difference * innovation * weight;
+        self.information += difference * difference * weight;
         if step >= self.until {
             self.shifted = None;
         }

@@ -368,19 +368,30 @@ impl Replayer {
 
     /// The next block of the log; its estimates replace what is in `estimates`, if wanted.
     pub fn push(&mut self, block: &Block, estimates: Option<&mut Estimates>) {
+        let values_of = |column: usize| block.values.get(column).map_or(&[][..], Vec::as_slice);
+        let mut done = vec![false; self.axes.len()];
+        if estimates.is_none() {
+            let axes = self.axes.par_iter_mut().zip(&self.assigned).zip(&mut done);
+            axes.for_each(|((axis, column), done)| {
+                *done = axis.rows(values_of(*column), &block.missing, &block.time_s);
+            });
+        }
         let mut outputs = estimates.map(|estimates| {
             estimates.time_s.clone_from(&block.time_s);
             estimates.axes.resize_with(self.axes.len(), AxisEstimates::default);
             estimates.axes.iter_mut()
         });
         let mut extra = block.extra.iter();
-        for (axis, &column) in self.axes.iter_mut().zip(&self.assigned) {
+        for ((axis, &column), done) in self.axes.iter_mut().zip(&self.assigned).zip(done) {
             let aids: Vec<&[f64]> = extra.by_ref().take(axis.aids()).map(Vec::as_slice).collect();
             let mut output = outputs.as_mut().and_then(Iterator::next);
             if let Some(output) = &mut output {
                 output.clear(axis.filter.x().len(), axis.channels.len());
             }
-            let values = block.values.get(column).map_or(&[][..], Vec::as_slice);
+            let values = values_of(column);
+            if done {
+                continue;
+            }
             for (row, ((z, missing), time)) in values.iter().zip(&block.missing).zip(&block.time_s).enumerate() {
                 axis.step(*z, *missing, *time, aids.iter().map(|aid| aid.get(row).copied().unwrap_or(f64::NAN)));
                 if let Some(output) = &mut output {
@@ -404,7 +415,8 @@ impl Replayer {
     }
 
     /// The statistics and the verdict.
-    pub fn finish(self) -> ReplayResult {
+    pub fn finish(mut self) -> ReplayResult {
+        self.axes.iter_mut().for_each(AxisReplay::flush);
         verdict::conclude(self)
     }
 }

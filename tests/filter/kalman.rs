@@ -15,7 +15,7 @@ fn scalar_steps_follow_the_textbook_recursion() {
     let mut kalman = Kalman::new(&model(&[&[0.5]], &[1.0], &[&[1.0]], 1.0, &[1.0], &[&[4.0]]));
     let first = kalman.update(0, 3.0, None);
     assert_eq!((first.innovation, first.variance, first.nis), (2.0, 5.0, 0.8));
-    assert!((first.log_likelihood + 0.5 * ((std::f64::consts::TAU * 5.0).ln() + 0.8)).abs() < 1e-15);
+    assert!((first.log_likelihood() + 0.5 * ((std::f64::consts::TAU * 5.0).ln() + 0.8)).abs() < 1e-15);
     assert!((kalman.x[0] - 2.6).abs() < 1e-15 && (kalman.p[(0, 0)] - 0.8).abs() < 1e-15);
     kalman.predict();
     assert!((kalman.x[0] - 1.3).abs() < 1e-15 && (kalman.p[(0, 0)] - 1.2).abs() < 1e-15);
@@ -147,7 +147,7 @@ fn run(kalman: &mut Kalman, z: &[f64]) -> Vec<[f64; 3]> {
             kalman.predict();
         }
         let update = kalman.update(0, *z, None);
-        [update.innovation, update.variance, update.log_likelihood]
+        [update.innovation, update.variance, update.log_likelihood()]
     };
     z.iter().enumerate().map(step).collect()
 }

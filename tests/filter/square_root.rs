@@ -62,7 +62,7 @@ fn equals_the_joseph_form() {
                     (a.variance / b.variance - 1.0).abs() < 1e-10
                         && (a.innovation - b.innovation).abs() < 1e-10 * a.variance.sqrt()
                 );
-                assert!((a.log_likelihood - b.log_likelihood).abs() < 1e-9 * a.log_likelihood.abs().max(1.0));
+                assert!((a.log_likelihood() - b.log_likelihood()).abs() < 1e-9 * a.log_likelihood().abs().max(1.0));
             }
             let p = root.covariance();
             for s in 0..m.x0.len() {

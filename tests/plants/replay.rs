@@ -118,7 +118,7 @@ fn an_angle_that_turns_over_is_followed_as_claimed() {
         if heading[k].is_finite() {
             let away = heading[k] - kalman.x[0];
             let z = heading[k] - 2.0 * PI * (away / (2.0 * PI)).round();
-            log_likelihood += kalman.update(0, z, None).log_likelihood;
+            log_likelihood += kalman.update(0, z, None).log_likelihood();
         }
     }
     let found = axis["log_likelihood"].as_f64().unwrap();

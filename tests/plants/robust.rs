@@ -187,9 +187,9 @@ fn a_custom_plant_is_replayed_with_its_known_input() {
         columns[0].push(z[0]);
         columns[1].push(if taken { z[1] } else { f64::NAN });
         columns[2].push(torque);
-        log_likelihood += kalman.update(0, z[0], None).log_likelihood;
+        log_likelihood += kalman.update(0, z[0], None).log_likelihood();
         if taken {
-            log_likelihood += kalman.update(1, z[1], None).log_likelihood;
+            log_likelihood += kalman.update(1, z[1], None).log_likelihood();
         }
         x = &model.f * x + &model.g * torque + &root_q * draw(n);
         kalman.predict();

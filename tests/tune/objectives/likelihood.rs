@@ -118,7 +118,7 @@ fn the_likelihood_is_that_of_the_plain_filter() {
         let model = &tuned(&params).design.axes[0].model;
         for rows in [1, 41, 2500, 3000] {
             let mut sum = 0.0;
-            run(model, &log, rows, |_, _, update| sum += update.log_likelihood);
+            run(model, &log, rows, |_, _, update| sum += update.log_likelihood());
             let found = log_likelihood(model, &log, rows);
             // some thousand terms of size one, rounded
             assert!((found - sum).abs() < 1e-8 || rows == 1, "{rows} rows: {found} {sum}");
@@ -161,7 +161,9 @@ fn held_out_rows_are_foretold_from_those_before() {
     assert_eq!((of_log.fitted_rows, of_log.held_out_rows), (2000, 1000));
     let model = &tuned.design.axes[0].model;
     let mut rest = 0.0;
-    run(model, &logs[0].axes[0], 3000, |row, _, update| rest += if row >= 2000 { update.log_likelihood } else { 0.0 });
+    run(model, &logs[0].axes[0], 3000, |row, _, update| {
+        rest += if row >= 2000 { update.log_likelihood() } else { 0.0 }
+    });
     assert!((of_log.held_out - rest).abs() < 1e-7, "{of_log:?} {rest}");
     // the start is wrong by factors: what it foretells is far worse
     assert!(record.likelihood[0].held_out_gain.unwrap() > 20.0);

@@ -1,0 +1,422 @@
+//! A whole log through a time-invariant filter: innovations, NIS and likelihood, each the same as those of [`Kalman`] to rounding.
+//!
+//! Gains and covariances of such a filter do not depend on the data. All of the state but a constant bias settles; the bias, whose variance
+//! falls like 1/t for ever, is split off (Friedland 1969): a filter without it gives ν̃ and S̃, and s, how ν̃ answers to the bias, settles too.
+//! With I the information on the bias, b̂ its estimate:
+//!
+//! ν = ν̃ − s b̂, S = S̃ (I + s²/S̃)/I, I ← I + s²/S̃, b̂ ← b̂ + (s/S̃)/I ν.
+//!
+//! Once S̃, its gain K and s stand still, a step is x ← F (I − K h) x + F K z, and Σ ln S telescopes to n ln S̃ + ln (I_end/I_start).
+
+use nalgebra::{DMatrix, DVector};
+use pulp::{Arch, NullaryFnOnce};
+
+use super::Kalman;
+use super::kalman::{predict_fixed, square, update_fixed};
+use super::steady_state::has_settled;
+use crate::model::LinearModel;
+
+/// Innovations of a log of the first measurement of `model`, one at every step; inputs are zero, other measurements are not taken.
+///
+/// Writes ν = z − H x(k|k−1) and ν²/S of every sample (NaN where it is not a finite number; the filter predicts over it) and hands back
+/// ln L = Σ −½ (ln 2πS + ν²/S). SI units. Panics when the three lists differ in length.
+///
+/// A model with at most six states beside the bias runs at the speed of its settled gains; others, and those that take their measurement
+/// more seldom, carry their covariance from step to step.
+pub fn innovations(model: &LinearModel, z: &[f64], innovation: &mut [f64], nis: &mut [f64]) -> f64 {
+    assert!(z.len() == innovation.len() && z.len() == nis.len(), "as many results as samples");
+    let log_likelihood = match TwoStage::new(model) {
+        Some(mut filter) => {
+            filter.run(z, innovation, nis);
+            filter.log_likelihood()
+        }
+        None => carried(model, z, innovation, nis),
+    };
+    for (nis, v) in nis.iter_mut().zip(innovation) {
+        *nis *= *v * *v;
+    }
+    log_likelihood
+}
+
+/// ν and 1/S by a filter that carries its whole covariance from step to step; hands back ln L.
+pub fn carried(model: &LinearModel, z: &[f64], innovation: &mut [f64], weight: &mut [f64]) -> f64 {
+    let every = model.every[0].max(1);
+    fn run<const N: usize>(carried: Carried<'_, N>) -> f64 {
+        Arch::new().dispatch(carried)
+    }
+    match (every, model.x0.len()) {
+        (1, 1) => run(Carried::<1> { model, z, innovation, weight }),
+        (1, 2) => run(Carried::<2> { model, z, innovation, weight }),
+        (1, 3) => run(Carried::<3> { model, z, innovation, weight }),
+        (1, 4) => run(Carried::<4> { model, z, innovation, weight }),
+        _ => {
+            let mut kalman = Kalman::new(model);
+            let mut log_likelihood = 0.0;
+            for (k, z) in z.iter().enumerate() {
+                if k > 0 {
+                    kalman.predict();
+                }
+                (innovation[k], weight[k]) = (f64::NAN, f64::NAN);
+                if k % every == 0 && z.is_finite() {
+                    let update = kalman.update(0, *z, None);
+                    (innovation[k], weight[k]) = (update.innovation, 1.0 / update.variance);
+                    log_likelihood += update.log_likelihood();
+                }
+            }
+            log_likelihood
+        }
+    }
+}
+
+/// Variances whose product is taken before its logarithm: a variance between 1e-18 and 1e18 cannot make it over- or underflow.
+const FACTORS: usize = 16;
+
+/// A filter of `N` states in registers, compiled for each instruction set.
+struct Carried<'a, const N: usize> {
+    model: &'a LinearModel,
+    z: &'a [f64],
+    innovation: &'a mut [f64],
+    weight: &'a mut [f64],
+}
+
+impl<const N: usize> NullaryFnOnce for Carried<'_, N> {
+    type Output = f64;
+    #[inline(always)]
+    fn call(self) -> f64 {
+        let Carried { model, z, innovation, weight } = self;
+        let (f, q) = (square::<N>(model.f.as_slice()), square::<N>(model.q.as_slice()));
+        let (h, r) = (std::array::from_fn(|i| model.h[(0, i)]), model.r[(0, 0)]);
+        let (mut x, mut p) = (std::array::from_fn(|i| model.x0[i]), square::<N>(model.p0.as_slice()));
+        let (mut log_variance, mut nis, mut count, mut started) = (0.0, 0.0, 0_u64, false);
+        let parts = z.chunks(FACTORS).zip(innovation.chunks_mut(FACTORS)).zip(weight.chunks_mut(FACTORS));
+        for ((z, innovation), weight) in parts {
+            let mut product = 1.0;
+            for ((z, innovation), weight) in z.iter().zip(innovation).zip(weight) {
+                if started {
+                    predict_fixed(&f, &q, &mut x, &mut p);
+                }
+                started = true;
+                (*innovation, *weight) = (f64::NAN, f64::NAN);
+                if z.is_finite() {
+                    let update = update_fixed(&h, r, *z, f64::INFINITY, &mut x, &mut p);
+                    (*innovation, *weight) = (update.innovation, 1.0 / update.variance);
+                    product *= update.variance;
+                    nis += update.nis;
+                    count += 1;
+                }
+            }
+            log_variance += product.ln();
+        }
+        -0.5 * (count as f64 * std::f64::consts::TAU.ln() + log_variance + nis)
+    }
+}
+
+/// The states that are not the bias: most that are kept in registers.
+const MOST: usize = 6;
+/// Innovations whose squares are added up at once.
+const BLOCK: usize = 1024;
+
+/// A time-invariant filter with one measurement at every step, in two stages.
+#[derive(Clone, Debug)]
+pub struct TwoStage {
+    /// The filter without the bias.
+    rest: Kalman,
+    f: DMatrix<f64>,
+    h: DVector<f64>,
+    r: f64,
+    /// F of the bias into the other states; h of the bias.
+    couple: DVector<f64>,
+    seen: f64,
+    /// Place of the bias among the states.
+    place: Option<usize>,
+    /// How the other states answer to the bias.
+    answer: DVector<f64>,
+    bias: f64,
+    /// 1/variance of the bias; infinite when it is known (or there is none).
+    information: f64,
+    /// Σ over the samples so far, without the constant.
+    log_variance: f64,
+    nis: f64,
+    count: u64,
+    /// A sample was taken: the next begins with a prediction.
+    started: bool,
+    /// P(k|k−1) and the answer of the sample before.
+    before: DMatrix<f64>,
+    answered: DVector<f64>,
+    spare: DVector<f64>,
+}
+
+impl TwoStage {
+    /// `None` for a model that it cannot run: more than six states beside the bias, or a measurement that is not taken at every step.
+    pub fn new(model: &LinearModel) -> Option<TwoStage> {
+        let n = model.x0.len();
+        if model.every.first() != Some(&1) {
+            return None;
+        }
+        let constant = |i: &usize| {
+            let i = *i;
+            let alone =
+                |j: usize| j == i || (model.f[(i, j)] == 0.0 && model.p0[(i, j)] == 0.0 && model.p0[(j, i)] == 0.0);
+            let still = (0..n).all(|j| model.q[(i, j)] == 0.0 && model.q[(j, i)] == 0.0);
+            model.f[(i, i)] == 1.0 && still && model.p0[(i, i)] > 0.0 && (0..n).all(alone)
+        };
+        let bias = (0..n).find(constant);
+        let kept: Vec<usize> = (0..n).filter(|i| Some(*i) != bias).collect();
+        if kept.len() > MOST {
+            return None;
+        }
+        let rest = model.part(&kept);
+        let of_bias = |column: DVector<f64>| column.select_rows(&kept);
+        Some(TwoStage {
+            place: bias,
+            started: false,
+            before: DMatrix::from_element(kept.len(), kept.len(), f64::NAN),
+            answered: DVector::from_element(kept.len(), f64::NAN),
+            spare: DVector::zeros(kept.len()),
+            f: rest.f.clone(),
+            h: rest.h.row(0).transpose(),
+            r: rest.r[(0, 0)],
+            couple: bias.map_or_else(|| DVector::zeros(kept.len()), |b| of_bias(model.f.column(b).into_owned())),
+            seen: bias.map_or(0.0, |b| model.h[(0, b)]),
+            answer: DVector::zeros(kept.len()),
+            bias: bias.map_or(0.0, |b| model.x0[b]),
+            information: bias.map_or(f64::INFINITY, |b| 1.0 / model.p0[(b, b)]),
+            rest: Kalman::new(&rest),
+            log_variance: 0.0,
+            nis: 0.0,
+            count: 0,
+        })
+    }
+
+    /// The next samples: ν and 1/S of each, NaN where it is not a finite number. Afterwards the state is that after the last.
+    pub fn run(&mut self, z: &[f64], innovation: &mut [f64], weight: &mut [f64]) {
+        let mut at = 0;
+        while at < z.len() {
+            if self.started {
+                self.predict();
+            }
+            self.started = true;
+            if !z[at].is_finite() {
+                (innovation[at], weight[at]) = (f64::NAN, f64::NAN);
+                self.before.fill(f64::NAN);
+                at += 1;
+                continue;
+            }
+            let still = |(a, b): (&f64, &f64)| (a - b).abs() <= 4.0 * f64::EPSILON * a.abs();
+            let settled = has_settled(&self.before, &self.rest.p) && self.answer.iter().zip(&self.answered).all(still);
+            // the last sample of a stretch is not among the settled, so that the state is that after it
+            let end = if settled {
+                z[at..].iter().position(|z| !z.is_finite()).map_or(z.len(), |bad| at + bad) - 1
+            } else {
+                at
+            };
+            if end > at {
+                let (z, innovation, weight) = (&z[at..end], &mut innovation[at..end], &mut weight[at..end]);
+                match self.h.len() {
+                    0 => self.settled::<0>(z, innovation, weight),
+                    1 => self.settled::<1>(z, innovation, weight),
+                    2 => self.settled::<2>(z, innovation, weight),
+                    3 => self.settled::<3>(z, innovation, weight),
+                    4 => self.settled::<4>(z, innovation, weight),
+                    5 => self.settled::<5>(z, innovation, weight),
+                    _ => self.settled::<MOST>(z, innovation, weight),
+                }
+                at = end;
+            }
+            self.before.copy_from(&self.rest.p);
+            self.answered.copy_from(&self.answer);
+            (innovation[at], weight[at]) = self.update(z[at]);
+            at += 1;
+        }
+    }
+
+    fn predict(&mut self) {
+        self.rest.predict();
+        self.spare.copy_from(&self.couple);
+        self.spare.gemv(1.0, &self.f, &self.answer, 1.0);
+        std::mem::swap(&mut self.answer, &mut self.spare);
+    }
+
+    /// Steps without a sample; cost grows with their logarithm, and with their number where the bias drives other states.
+    pub fn pause(&mut self, steps: u64) {
+        if self.couple.iter().all(|f| *f == 0.0) {
+            let mut carrier = self.rest.clone();
+            carrier.x.copy_from(&self.answer);
+            carrier.predict_many(steps);
+            self.answer.copy_from(&carrier.x);
+            self.rest.predict_many(steps);
+        } else {
+            (0..steps).for_each(|_| self.predict());
+        }
+        self.before.fill(f64::NAN);
+    }
+
+    /// ln L of all samples so far.
+    pub fn log_likelihood(&self) -> f64 {
+        -0.5 * (self.count as f64 * std::f64::consts::TAU.ln() + self.log_variance + self.nis)
+    }
+
+    /// x(k|k) and P(k|k) of the whole state: x = x̃ + V b̂, P = P̃ + V Vᵀ/I with V the answer to the bias.
+    pub fn state(&self) -> (DVector<f64>, DMatrix<f64>) {
+        let Some(place) = self.place else { return (self.rest.x.clone(), self.rest.p.clone()) };
+        let n = self.h.len() + 1;
+        let answer = self.answer.clone().insert_row(place, 1.0);
+        let other = |i: usize| if i < place { i } else { i - 1 };
+        let x =
+            DVector::from_fn(n, |i, _| self.bias * answer[i] + if i == place { 0.0 } else { self.rest.x[other(i)] });
+        let p = DMatrix::from_fn(n, n, |i, j| {
+            let rest = if i == place || j == place { 0.0 } else { self.rest.p[(other(i), other(j))] };
+            rest + answer[i] * answer[j] / self.information
+        });
+        (x, p)
+    }
+
+    /// One update; hands back ν and 1/S.
+    fn update(&mut self, z: f64) -> (f64, f64) {
+        let s = self.seen + self.h.dot(&self.answer);
+        let update = self.rest.update(0, z, None);
+        // K = P(k|k) hᵀ/r
+        self.answer.gemv(-s / self.r, &self.rest.p, &self.h, 1.0);
+        let innovation = update.innovation - s * self.bias;
+        let variance = update.variance + s * s / self.information;
+        self.information += s * s / update.variance;
+        self.bias += s / update.variance / self.information * innovation;
+        let nis = innovation * innovation / variance;
+        self.log_variance += variance.ln();
+        self.nis += nis;
+        self.count += 1;
+        (innovation, 1.0 / variance)
+    }
+
+    /// Samples with everything but the bias settled; x is predicted for the first, and afterwards for the one that follows the last.
+    fn settled<const N: usize>(&mut self, z: &[f64], innovation: &mut [f64], weight: &mut [f64]) {
+        let direction = &self.rest.p * &self.h;
+        let variance = self.h.dot(&direction) + self.r;
+        let driven = &self.f * direction / variance;
+        let closed = &self.f - &driven * self.h.transpose();
+        let s = self.seen + self.h.dot(&self.answer);
+        let mut run = Settled::<N> {
+            closed: std::array::from_fn(|i| std::array::from_fn(|j| closed[(i, j)])),
+            driven: std::array::from_fn(|i| driven[i]),
+            h: std::array::from_fn(|i| self.h[i]),
+            x: std::array::from_fn(|i| self.rest.x[i]),
+            s,
+            weight: 1.0 / variance,
+            more: s * s / variance,
+            start: self.information,
+            steps: 0.0,
+            bias: self.bias,
+        };
+        self.nis += Arch::new().dispatch(Run { gains: &mut run, z, innovation, weight });
+        self.rest.x.copy_from_slice(&run.x);
+        self.count += z.len() as u64;
+        self.log_variance += z.len() as f64 * variance.ln();
+        if self.information.is_finite() {
+            let information = run.information();
+            self.log_variance += (information / self.information).ln();
+            (self.information, self.bias) = (information, run.bias);
+        }
+    }
+}
+
+/// The recursion with constant gains: `N` states and the bias.
+struct Settled<const N: usize> {
+    /// F (I − K h) by rows, F K, h.
+    closed: [[f64; N]; N],
+    driven: [f64; N],
+    h: [f64; N],
+    /// x(k|k−1) without the bias.
+    x: [f64; N],
+    s: f64,
+    /// 1/S̃, and s²/S̃, the information that each sample adds.
+    weight: f64,
+    more: f64,
+    /// Information at the first of these samples, and how many there were since.
+    start: f64,
+    steps: f64,
+    bias: f64,
+}
+
+impl<const N: usize> Settled<N> {
+    /// Summed by multiplication, so that many small additions do not round it away.
+    #[inline(always)]
+    fn information(&self) -> f64 {
+        self.start + self.steps * self.more
+    }
+
+    /// ν̃, and the next prediction.
+    #[inline(always)]
+    fn step(&mut self, z: f64) -> f64 {
+        let mut rest = z;
+        let mut next = [0.0; N];
+        for i in 0..N {
+            rest -= self.h[i] * self.x[i];
+            next[i] = self.driven[i] * z;
+        }
+        for (next, row) in next.iter_mut().zip(&self.closed) {
+            for (f, x) in row.iter().zip(&self.x) {
+                *next += f * x;
+            }
+        }
+        self.x = next;
+        rest
+    }
+
+    /// Writes ν and 1/S of at most [`BLOCK`] samples, hands back Σ ν²/S.
+    ///
+    /// What does not depend on the data, and what does not depend on the sample before, is done for many samples by one instruction.
+    #[inline(always)]
+    fn block(&mut self, z: &[f64], innovation: &mut [f64], weight: &mut [f64]) -> f64 {
+        // b̂ ← (1 − s g) b̂ + g ν̃ with the gain g = s/S̃/I; 1/S = I/(I + s²/S̃)/S̃
+        let [mut gain, mut kept, mut biases] = [[0.0; BLOCK]; 3];
+        if self.start.is_finite() {
+            for (k, ((gain, kept), weight)) in gain.iter_mut().zip(&mut kept).zip(&mut *weight).enumerate() {
+                let before = self.start + (self.steps + k as f64) * self.more;
+                let inverse = 1.0 / (self.start + (self.steps + (k + 1) as f64) * self.more);
+                *gain = self.s * self.weight * inverse;
+                *kept = 1.0 - *gain * self.s;
+                *weight = before * inverse * self.weight;
+            }
+        } else {
+            kept = [1.0; BLOCK];
+            weight.fill(self.weight);
+        }
+        let mut bias = self.bias;
+        for ((((z, v), b), gain), kept) in z.iter().zip(&mut *innovation).zip(&mut biases).zip(&gain).zip(&kept) {
+            let rest = self.step(*z);
+            (*v, *b) = (rest, bias);
+            bias = kept * bias + gain * rest;
+        }
+        self.bias = bias;
+        self.steps += z.len() as f64;
+        let mut sums = [0.0; 8];
+        for ((v, weight), biases) in innovation.chunks_mut(8).zip(weight.chunks(8)).zip(biases.chunks(8)) {
+            for (((sum, v), weight), bias) in sums.iter_mut().zip(v).zip(weight).zip(biases) {
+                *v -= self.s * bias;
+                *sum += *v * *v * weight;
+            }
+        }
+        sums.iter().sum()
+    }
+}
+
+/// A stretch with settled gains, compiled for each instruction set; hands back Σ ν²/S.
+struct Run<'a, const N: usize> {
+    gains: &'a mut Settled<N>,
+    z: &'a [f64],
+    innovation: &'a mut [f64],
+    weight: &'a mut [f64],
+}
+
+impl<const N: usize> NullaryFnOnce for Run<'_, N> {
+    type Output = f64;
+    #[inline(always)]
+    fn call(self) -> f64 {
+        let blocks = self.z.chunks(BLOCK).zip(self.innovation.chunks_mut(BLOCK)).zip(self.weight.chunks_mut(BLOCK));
+        let mut sum = 0.0;
+        for ((z, innovation), weight) in blocks {
+            sum += self.gains.block(z, innovation, weight);
+        }
+        sum
+    }
+}

@@ -348,11 +348,10 @@ impl<const N: usize> Settled<N> {
     #[inline(always)]
     fn step(&mut self, z: f64) -> f64 {
         let mut rest = z;
-        let mut next = [0.0; N];
-        for i in 0..N {
-            rest -= self.h[i] * self.x[i];
-            next[i] = self.driven[i] * z;
+        for (h, x) in self.h.iter().zip(&self.x) {
+            rest -= h * x;
         }
+        let mut next = self.driven.map(|k| k * z);
         for (next, row) in next.iter_mut().zip(&self.closed) {
             for (f, x) in row.iter().zip(&self.x) {
                 *next += f * x;

@@ -112,8 +112,8 @@ impl Judged {
                 nees[l] += u[l] * u[l];
             }
         }
-        for l in 0..LANES {
-            self.nees[step][l] += nees[l] * self.used[l];
+        for ((sum, nees), used) in self.nees[step].iter_mut().zip(nees).zip(self.used) {
+            *sum += nees * used;
         }
     }
 

@@ -204,10 +204,10 @@ impl Bank {
             x.iter_mut().zip(&gain[..]).for_each(|(x, k)| *x += *k * innovation);
             innovations[c] = innovation;
         }
-        for i in 0..self.columns {
-            let weighted = innovations[i] * inverse;
-            for j in 0..=i {
-                self.sums[i][j] += weighted * innovations[j];
+        for (i, (sums, v)) in self.sums.iter_mut().zip(innovations).take(self.columns).enumerate() {
+            let weighted = v * inverse;
+            for (sum, other) in sums.iter_mut().zip(innovations).take(i + 1) {
+                *sum += weighted * other;
             }
         }
         self.product *= variance / self.r;
@@ -280,8 +280,10 @@ impl Bank {
                 self.sums[1][1] += length_of_all * constant * constant * settled.inverse;
             }
             None => {
-                for i in 0..self.columns {
-                    (0..=i).for_each(|j| self.sums[i][j] += products[i][j] * settled.inverse);
+                for (i, (sums, products)) in self.sums.iter_mut().zip(&products).take(self.columns).enumerate() {
+                    for (sum, product) in sums.iter_mut().zip(products).take(i + 1) {
+                        *sum += *product * settled.inverse;
+                    }
                 }
             }
         }

@@ -11,6 +11,7 @@ pub mod consistency;
 pub mod export;
 pub mod filter;
 pub mod identify;
+pub mod import;
 pub mod input;
 pub mod model;
 pub mod montecarlo;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// The one table of rooms: floor, room, and the rooms of its own floor it may use besides every lower floor.
 /// `docs/architecture.md` shows the same table.
-const HOUSE: [(u8, &str, &[&str]); 19] = [
+const HOUSE: [(u8, &str, &[&str]); 20] = [
     (0, "units", &[]),
     (0, "numerics", &[]),
     (1, "signal", &[]),
@@ -13,6 +13,7 @@ const HOUSE: [(u8, &str, &[&str]); 19] = [
     (1, "params", &["noise"]),
     (2, "input", &[]),
     (2, "allan", &[]),
+    (2, "import", &[]),
     (2, "model", &[]),
     (3, "filter", &[]),
     (3, "simulate", &[]),

@@ -4,19 +4,22 @@ mod sight;
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, anyhow, bail};
 
 use super::Status;
 use super::log_flags::{LogFlags, print_check};
 use super::output::{digits, notes, print_json, print_text, table};
 use super::stretch::stretches;
 use super::tests_table::{TESTS, caption, rows};
-use crate::compare::{self, AxisComparison, Comparison, Log, LogAxis};
+use crate::compare::parameters::parameters;
+use crate::compare::{self, AxisComparison, Beside, Comparison, Log, LogAxis};
 use crate::consistency::Verdict;
 use crate::export::atomic;
-use crate::params::Params;
+use crate::import::{self, ImportError};
+use crate::params::{AxisParams, Params};
+use crate::replay::axes::partners;
 use crate::signal::LogCheck;
-use crate::units::Unit;
+use crate::units::{Quantity, Unit};
 
 /// Does a noise model fit a log that it may not come from?
 ///
@@ -24,15 +27,20 @@ use crate::units::Unit;
 /// log. A test fails when its deviation is significant (Holm, over all tests and axes) and beyond what is tolerated. Exit status 1 only when
 /// the verdict is inconsistent.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example: kfdesign compare params.json other_day.csv --report compare.html")]
+#[command(
+    after_help = "Examples: kfdesign compare params.json other_day.csv --report compare.html; kfdesign compare imu.yaml log.bag --parameters"
+)]
 pub struct Args {
-    /// The noise parameters
+    /// The noise parameters: params.json, or a file that `kfdesign import` reads
     params: PathBuf,
     /// The log, sensor at rest, of any format that `kfdesign info` reads
     log: PathBuf,
     /// Probability of a false alarm, over all tests together
     #[arg(long, default_value_t = 0.01, value_name = "P")]
     alpha: f64,
+    /// Identify the log too, and put every number of the file beside the log's own: its interval, the ratio, and whether it lies inside
+    #[arg(long)]
+    parameters: bool,
     /// The verdict document
     #[arg(short, long, value_name = "FILE.json")]
     output: Option<PathBuf>,
@@ -70,17 +78,57 @@ pub(super) fn read(
         atomic::check_output(output, log)?;
         atomic::refuse_input_as_output(output, params)?;
     }
-    let params = Params::read(params)?;
+    let given = given(params)?;
     let options = reading.options()?;
     let (recording, check) = crate::input::read(log, &options)?;
     print_check(&recording.name, &check);
+    let mut params = of_quantity(given, recording.quantity, params)?;
     let parts = stretches(&recording, options.kind);
     let unit =
         parts.first().map(|p| p.unit.clone()).with_context(|| format!("{}: no axis to work on", log.display()))?;
     parts.iter().for_each(|part| part.print_left_out("is used"));
-    let axes = parts.into_iter().map(|p| LogAxis { name: p.name, rate: p.rate, left_out: p.left_out }).collect();
+    let axes: Vec<LogAxis> =
+        parts.into_iter().map(|p| LogAxis { name: p.name, rate: p.rate, left_out: p.left_out }).collect();
+    one_for_all(&mut params, &axes);
     let log = Log { quantity: recording.quantity, sample_rate_hz: recording.sample_rate_hz, axes };
     Ok(Pair { params, log, check, sha256: recording.sha256, unit })
+}
+
+/// Axes that are alike but cannot be told apart in the log (a file has one number for three of them): one stands for every axis of the log.
+fn one_for_all(params: &mut Params, log: &[LogAxis]) {
+    let wanted: Vec<&str> = params.axes.iter().map(|axis| axis.name.as_str()).collect();
+    let found: Vec<&str> = log.iter().map(|axis| axis.name.as_str()).collect();
+    let alike = params.axes.windows(2).all(|pair| pair[0].terms == pair[1].terms);
+    if partners(&wanted, &found).is_none()
+        && alike
+        && let Some(first) = params.axes.first().cloned()
+    {
+        params.axes = found.iter().map(|name| AxisParams { name: (*name).to_owned(), ..first.clone() }).collect();
+    }
+}
+
+/// Parameters of one sensor, or of the two that a file of another program may have.
+fn given(path: &Path) -> anyhow::Result<Vec<Params>> {
+    if !import::knows(path) {
+        return Ok(vec![Params::read(path)?]);
+    }
+    let found = import::read(path, None).map_err(|error| match &error {
+        ImportError::Rate { path, why } => {
+            anyhow!("{path}: {why}: first kfdesign import {path} --rate HZ -o params.json, then compare params.json")
+        }
+        _ => anyhow!(error),
+    })?;
+    found.warnings.iter().for_each(|warning| eprintln!("  warning: {warning}"));
+    Ok(found.sensors)
+}
+
+/// Those of the log's quantity, else the first, of which it is then said that they do not fit.
+fn of_quantity(mut given: Vec<Params>, quantity: Quantity, path: &Path) -> anyhow::Result<Params> {
+    let at = given.iter().position(|params| params.quantity == quantity).unwrap_or(0);
+    if given.is_empty() {
+        bail!("{}: no sensor is in it", path.display());
+    }
+    Ok(given.swap_remove(at))
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
@@ -91,6 +139,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     result.params = Some(args.params.display().to_string());
     result.log = Some(args.log.display().to_string());
     result.log_sha256 = pair.sha256;
+    if args.parameters {
+        result.parameters =
+            parameters(&pair.params, &pair.log, &pair.unit).with_context(|| args.log.display().to_string())?;
+    }
     if pair.check.findings.iter().any(|f| f.kind == "motion") {
         let note = "the log is not at rest all the time (see the log check): motion counts as noise here; cut it with --start/--end";
         result.axes.iter_mut().for_each(|axis| axis.notes.push(note.into()));
@@ -130,8 +182,31 @@ fn text(result: &Comparison, unit: &Unit) -> String {
     if let Some(axis) = result.axes.first() {
         out += &format!("{}: {}.\n", axis.name, axis.means.sentence);
     }
+    if !result.parameters.is_empty() {
+        out += &format!("\n{BESIDE_CAPTION}:\n{}", table(&BESIDE, &beside_rows(result)));
+        beside_words(result).iter().for_each(|sentence| out += &format!("{sentence}.\n"));
+    }
     out += &notes(result.axes.iter().map(|a| (a.name.as_str(), a.notes.as_slice())));
     format!("{out}\n{}: {}\n", result.verdict.word(), result.meaning)
+}
+
+const BESIDE_CAPTION: &str = "The file's numbers beside the log's own (95 % intervals, each alone)";
+const BESIDE: [&str; 9] = ["axis", "parameter", "file", "this log", "from", "to", "unit", "file/log", "held against"];
+
+fn beside_rows(result: &Comparison) -> Vec<Vec<String>> {
+    let number = |value: Option<f64>| value.map_or_else(|| "-".into(), digits);
+    let row = |b: &Beside| {
+        let ends = b.interval.map_or([None; 2], |ends| ends.map(Some));
+        let cells = [Some(b.file), b.log, ends[0], ends[1]].map(number);
+        [vec![b.axis.clone(), b.parameter.clone()], cells.into(), vec![b.unit.clone(), number(b.ratio), b.how.clone()]]
+            .concat()
+    };
+    result.parameters.iter().map(row).collect()
+}
+
+/// A sentence for each number.
+fn beside_words(result: &Comparison) -> Vec<String> {
+    result.parameters.iter().map(|b| b.meaning.clone()).collect()
 }
 
 fn mean_rows(result: &Comparison, unit: &Unit) -> Vec<Vec<String>> {

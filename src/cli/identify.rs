@@ -1,7 +1,7 @@
 //! `kfdesign identify`.
 
 mod sight;
-mod tables;
+pub(super) mod tables;
 mod temperature;
 
 use std::path::{Path, PathBuf};

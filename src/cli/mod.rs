@@ -8,12 +8,16 @@ mod aid_columns;
 pub mod allan;
 mod allan_figure;
 pub mod compare;
+pub mod completions;
+pub mod datasheet;
 pub mod export;
 mod flags;
 pub mod identify;
+pub mod import;
 pub mod inflate;
 pub mod info;
 pub mod log_flags;
+pub mod man;
 pub mod montecarlo;
 pub mod output;
 pub mod plan;
@@ -64,7 +68,11 @@ enum Command {
     Montecarlo(montecarlo::Args),
     Merge(montecarlo::MergeArgs),
     Export(export::Args),
+    Import(import::Args),
+    Datasheet(datasheet::Args),
     Schema(schema::Args),
+    Completions(completions::Args),
+    Man(man::Args),
 }
 
 /// Parse the process arguments, run, map to the exit status.
@@ -94,7 +102,11 @@ pub fn main() -> ExitCode {
         Command::Montecarlo(args) => montecarlo::run(&args),
         Command::Merge(args) => montecarlo::merge(&args),
         Command::Export(args) => export::run(&args),
+        Command::Import(args) => import::run(&args),
+        Command::Datasheet(args) => datasheet::run(&args),
         Command::Schema(args) => schema::run(&args),
+        Command::Completions(args) => completions::run(&args),
+        Command::Man(args) => man::run(&args),
     };
     match result {
         Ok(Status::Done) => ExitCode::SUCCESS,

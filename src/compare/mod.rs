@@ -1,7 +1,7 @@
 //! A noise model held against a log that it may not come from (floor 5): does it fit, and how much louder is the log?
 //!
 //! `curve` holds the Allan curve against the envelope that the model draws around its own, `spectrum` the spectrum in bands and as a whole,
-//! `innovations` what the model's filter leaves, `means` shows why equal means prove nothing; `inflation` measures the factor between a
+//! `innovations` what the model's filter leaves, `means` shows why equal means prove nothing, `parameters` puts a file's numbers beside the log's; `inflation` measures the factor between a
 //! bench log's wideband noise and that of a vehicle that vibrates; `designs` ranks filters on logs.
 
 mod curve;
@@ -9,6 +9,7 @@ pub mod designs;
 pub mod inflation;
 mod innovations;
 mod means;
+pub mod parameters;
 mod spectrum;
 
 use rayon::prelude::*;
@@ -24,6 +25,7 @@ use crate::units::{Quantity, digits};
 pub use curve::AllanEnvelope;
 pub use innovations::Innovations;
 pub use means::Means;
+pub use parameters::Beside;
 pub use spectrum::Band;
 
 /// Fewest samples with which anything is compared: three averages of some thirty.
@@ -102,6 +104,8 @@ pub struct Comparison {
     pub params_sample_rate: f64,
     pub axes: Vec<AxisComparison>,
     pub tests: Vec<Test>,
+    /// With `--parameters`: the file's numbers beside the log's.
+    pub parameters: Vec<Beside>,
 }
 
 /// Holds the model of every axis against the log; the model is sampled at the log's rate.
@@ -144,6 +148,7 @@ pub fn compare(params: &Params, log: &Log, alpha: f64) -> Result<Comparison, Com
         params_sample_rate: params.sample_rate_hz,
         axes,
         tests,
+        parameters: Vec::new(),
     })
 }
 

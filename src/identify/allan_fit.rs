@@ -90,6 +90,7 @@ pub(super) fn identify(
         exact_log_likelihood: None,
         time_profile: None,
         fitted: None,
+        sums: super::Sums::default(),
         not_identified,
         warnings,
         steps: vec![],

@@ -116,6 +116,7 @@ pub(super) fn identify(name: &str, rate: &[f64], dt: f64, display: &Unit) -> Res
         exact_log_likelihood: None,
         time_profile: None,
         fitted: None,
+        sums: super::Sums::default(),
         not_identified,
         warnings,
         steps,

@@ -21,6 +21,7 @@ use crate::numerics::reduce::mean;
 use crate::params::{AxisParams, Measured, NotIdentified, TermEntry};
 use crate::units::{Unit, digits};
 pub use likelihood::shared::{SharedTime, TimeProfile, shared_time};
+pub use likelihood::sums::{Sum, Sums};
 use points::Distance;
 
 /// How parameters are taken from a log.
@@ -107,6 +108,8 @@ pub struct Identified {
     pub exact_log_likelihood: Option<f64>,
     /// Likelihood only: the model as it was fitted, to see what of it follows the temperature.
     pub fitted: Option<Fitted>,
+    /// Likelihood only: what white noise and drift are as a whole.
+    pub sums: Sums,
     /// Likelihood only, with one Gauss-Markov process: to compare the axes.
     pub time_profile: Option<TimeProfile>,
     pub not_identified: Vec<NotIdentified>,

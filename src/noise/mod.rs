@@ -24,6 +24,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::units::digits;
 
+/// Floor of the Allan deviation of flicker over its coefficient B: √(2 ln 2/π) (IEEE Std 952-1997, Annex C).
+pub const FLICKER_FLOOR: f64 = 0.664_282_470_267_96;
+/// Maximum of the Allan deviation of a Gauss-Markov process over its σ, at τ = 1.892617833 Tc: the maximum of
+/// √((2/x)(1 − (3 − 4e^(−x) + e^(−2x))/2x)).
+pub const GAUSS_MARKOV_PEAK: f64 = 0.617_364_283_144_44;
+
 /// The kinds of term, in the fixed order used everywhere (documents, tables, random streams).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]

@@ -1,6 +1,6 @@
 //! Figures and the report page of a comparison: a view of [`Comparison`].
 
-use super::{MEANS, mean_rows};
+use super::{BESIDE, BESIDE_CAPTION, MEANS, beside_rows, beside_words, mean_rows};
 use crate::cli::output::digits;
 use crate::cli::tests_table::{self, TESTS, caption};
 use crate::compare::{AxisComparison, Band, Comparison};
@@ -60,6 +60,10 @@ pub(super) fn page(result: &Comparison, unit: &Unit) -> Page {
         .table(format!("In {unit}"), &MEANS, mean_rows(result, unit))
         .list(result.axes.iter().map(|a| format!("{}: {}.", a.name, a.means.sentence)).collect());
     let mut sections = vec![tests];
+    if !result.parameters.is_empty() {
+        let beside = Section::new("The file's numbers");
+        sections.push(beside.table(BESIDE_CAPTION, &BESIDE, beside_rows(result)).list(beside_words(result)));
+    }
     for axis in &result.axes {
         let mut section = Section::new(axis.name.clone());
         for note in &axis.notes {

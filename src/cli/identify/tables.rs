@@ -3,6 +3,7 @@
 use super::Axis;
 use crate::cli::output::digits;
 use crate::identify::{Candidate, Precision};
+use crate::noise::FLICKER_FLOOR;
 use crate::params::{Measured, TermEntry};
 use crate::units::{Quantity, Unit};
 
@@ -52,7 +53,7 @@ fn row(name: &str, value: &Measured, also: String) -> Vec<String> {
 }
 
 /// One row for each parameter, in the order of the document.
-fn term_rows(terms: &[TermEntry], quantity: Quantity) -> Vec<Vec<String>> {
+pub(in crate::cli) fn term_rows(terms: &[TermEntry], quantity: Quantity) -> Vec<Vec<String>> {
     let mut rows = Vec::new();
     let white =
         terms.iter().find_map(|term| if let TermEntry::White { density } = term { Some(density) } else { None });
@@ -106,7 +107,7 @@ fn floor_name(coefficient: &Measured, quantity: Quantity) -> String {
         Quantity::AngularRate => "deg/h",
         Quantity::SpecificForce => "mg",
     };
-    let floor = (2.0 * std::f64::consts::LN_2 / std::f64::consts::PI).sqrt() * coefficient.si();
+    let floor = FLICKER_FLOOR * coefficient.si();
     in_unit(floor, unit).map_or_else(String::new, |value| format!("Allan floor 0.6643 B = {value}"))
 }
 

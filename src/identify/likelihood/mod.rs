@@ -1,7 +1,7 @@
 //! Maximum likelihood on the cosine coefficients of the log: terms chosen, intervals given, the Cramér-Rao bound beside them.
 //!
 //! `ordinates` is the log in bins, `form` what a model consists of, `whittle` the likelihood and its maximum, `growth` the choice of the
-//! terms, `interval` what is known of each parameter, `plan` how long a log must be for that, `temperature` what of it follows the temperature.
+//! terms, `interval` what is known of each parameter, `sums` of several together, `plan` how long a log must be for that, `temperature` what of it follows the temperature.
 
 mod exact;
 mod form;
@@ -10,6 +10,7 @@ mod interval;
 mod ordinates;
 pub mod plan;
 pub(super) mod shared;
+pub(super) mod sums;
 pub mod temperature;
 mod turn_on;
 mod whittle;
@@ -101,6 +102,7 @@ pub(super) fn identify(
         not_identified.extend(words.look_alikes(&fits, chosen));
         not_identified.extend(words.no_drift(fit));
     }
+    let sums = sums::sums(&data, fit, refined.as_ref().and_then(|refined| refined.information.as_ref()));
     let fit_p_value = goodness(&data, fit);
     let candidate = |(i, (fit, known)): (usize, &(Fit, Vec<Precision>))| Candidate {
         model: fit.form.label(),
@@ -130,6 +132,7 @@ pub(super) fn identify(
         precision: known_precision(&terms),
         time_profile: shared::TimeProfile::new(&data, on_cosines),
         fitted: Some(fitted.clone()),
+        sums,
         // of the parameters that are written, not of others
         exact_log_likelihood: refined.filter(|_| all_known).map(|refined| refined.log_likelihood),
         warnings: words.warnings(fit, fit_p_value),

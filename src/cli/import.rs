@@ -1,0 +1,118 @@
+//! `kfdesign import`.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::bail;
+
+use super::Status;
+use super::identify::tables::term_rows;
+use super::output::{digits, print_json, print_text, table};
+use crate::export::atomic;
+use crate::import::{self, Imported};
+use crate::params::Params;
+use crate::units::Quantity;
+
+/// Noise parameters from the files of other programs
+///
+/// Kalibr, OpenVINS, ORB-SLAM3, imu_utils (both kinds) and gnss-ins-sim, known by their content. What each number is and how it became a parameter is
+/// said. `compare FILE LOG --parameters` puts them beside what a log says.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example: kfdesign import imu.yaml -o gyro.json --accelerometer accelerometer.json")]
+pub struct Args {
+    /// The file
+    file: PathBuf,
+    /// The parameters of its gyro; where it has none, of its accelerometer
+    #[arg(short, long, value_name = "FILE.json")]
+    output: Option<PathBuf>,
+    /// The parameters of its accelerometer
+    #[arg(long, value_name = "FILE.json")]
+    accelerometer: Option<PathBuf>,
+    /// Sample rate of the sensor in Hz; before that of the file
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    rate: Option<f64>,
+    /// The parameters on stdout, one document (that of -o)
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
+    check_rate(args.rate)?;
+    for output in [&args.output, &args.accelerometer].into_iter().flatten() {
+        atomic::check_output(output, &args.file)?;
+    }
+    let found = import::read(&args.file, args.rate)?;
+    finish(&found, &args.file.display().to_string(), args.output.as_deref(), args.accelerometer.as_deref(), args.json)
+}
+
+pub(super) fn check_rate(rate: Option<f64>) -> anyhow::Result<()> {
+    match rate.filter(|v| !(*v > 0.0 && v.is_finite())) {
+        Some(rate) => bail!("--rate {rate}: expected a number above zero"),
+        None => Ok(()),
+    }
+}
+
+/// Writes, prints, warns.
+pub(super) fn finish(
+    found: &Imported,
+    name: &str,
+    output: Option<&Path>,
+    accelerometer: Option<&Path>,
+    json: bool,
+) -> anyhow::Result<Status> {
+    let Some(first) = found.sensors.first() else { bail!("{name}: no sensor is in it") };
+    let of_force = found.sensor(Quantity::SpecificForce);
+    if accelerometer.is_some() && of_force.is_none() {
+        bail!("--accelerometer: {name} has no accelerometer");
+    }
+    for warning in &found.warnings {
+        eprintln!("  warning: {warning}");
+    }
+    let mut written = String::new();
+    for (path, params) in [(output, Some(first)), (accelerometer, of_force)] {
+        if let (Some(path), Some(params)) = (path, params) {
+            atomic::write(path, params.to_json().as_bytes())?;
+            written += &format!("{} written: {}\n", path.display(), params.quantity.name());
+        }
+    }
+    if json {
+        print_json(first)?;
+    } else {
+        print_text(&format!("{}{written}", text(found)))?;
+    }
+    Ok(Status::Done)
+}
+
+/// Everything a person wants to see.
+fn text(found: &Imported) -> String {
+    let rates: Vec<String> =
+        found.sensors.iter().map(|p| format!("{} at {} Hz", p.quantity.name(), digits(p.sample_rate_hz))).collect();
+    let mut out = format!("{}: {}\n", found.origin, rates.join(", "));
+    let rows: Vec<Vec<String>> = found.sensors.iter().flat_map(rows).collect();
+    out += &table(&["axis", "parameter", "value", "unit", "also"], &rows);
+    out.push('\n');
+    found.rules.iter().for_each(|rule| out += &format!("{rule}.\n"));
+    out
+}
+
+/// Axes that are alike in one row.
+fn rows(params: &Params) -> Vec<Vec<String>> {
+    let mut groups: Vec<(String, Vec<Vec<String>>)> = Vec::new();
+    for axis in &params.axes {
+        let spread =
+            axis.turn_on_bias.iter().map(|v| ("turn-on bias sigma", v)).chain(axis.bias.iter().map(|v| ("bias", v)));
+        let own: Vec<Vec<String>> = term_rows(&axis.terms, params.quantity)
+            .into_iter()
+            // a file has no intervals
+            .map(|row| [&row[..2], &row[4..]].concat())
+            .chain(spread.map(|(name, v)| vec![name.into(), digits(v.value), v.unit.to_string(), String::new()]))
+            .collect();
+        match groups.iter_mut().find(|(_, rows)| *rows == own) {
+            Some((names, _)) => *names += &format!(",{}", axis.name),
+            None => groups.push((axis.name.clone(), own)),
+        }
+    }
+    groups
+        .into_iter()
+        .flat_map(|(names, rows)| rows.into_iter().map(move |row| [vec![names.clone()], row].concat()))
+        .collect()
+}

@@ -29,8 +29,34 @@ rostopic:                    /imu0      #the IMU ROS topic
 update_rate:                 100.0
 "#;
 
-/// Written by gaowenliang/imu_utils for a DJI A3 at 400 Hz (its data/A3_imu_param.yaml, first digits).
+/// As gaowenliang/imu_utils writes the reference sensor at 400 Hz: N √400, and 0.013114 deg/s, the lowest point of its Allan deviation.
 const DEVIATIONS: &str = r#"%YAML:1.0
+---
+type: IMU
+name: skydog
+Gyr:
+   unit: " rad/s"
+   avg-axis:
+      gyr_n: 3.0e-02
+      gyr_w: 2.0e-04
+   x-axis:
+      gyr_n: 1.9617500792e-02
+      gyr_w: 2.2888e-04
+   y-axis:
+      gyr_n: 2.9617500792e-02
+      gyr_w: 3.2888e-04
+   z-axis:
+      gyr_n: 3.9617500792e-02
+      gyr_w: 4.2888e-04
+Acc:
+   unit: " m/s^2"
+   avg-axis:
+      acc_n: 4.0e-02
+      acc_w: 6.32492e-04
+"#;
+
+/// Written by an early gaowenliang/imu_utils for a DJI A3 at 400 Hz (its data/A3_imu_param.yaml, first digits): N/20 would lie below the floor.
+const EARLY: &str = r#"%YAML:1.0
 ---
 type: IMU
 name: A3
@@ -92,6 +118,7 @@ fn bench() -> Bench {
     for (name, text) in [
         ("kalibr.yaml", KALIBR),
         ("deviations.yaml", DEVIATIONS),
+        ("early.yaml", EARLY),
         ("densities.yaml", DENSITIES),
         ("imu_err.py", DICTIONARY),
     ] {
@@ -162,13 +189,23 @@ fn every_file_gives_the_sensor_of_the_reference_table() {
     // two dialects of one program: a deviation per sample and a floor, or densities
     bench.ok("import deviations.yaml --rate 400 -o deviations.json --accelerometer force.json");
     let found = params(&bench, "deviations.json");
+    let floor = (2.0 * LN_2 / PI).sqrt();
+    let flicker = |n: f64, w: f64| [Term::White { density: n }, Term::BiasInstability { coefficient: w / floor }];
+    assert_terms(&terms(&found, 0), &flicker(N, 2.2888e-4), EXACT);
+    assert_terms(&terms(&found, 1), &flicker(2.9617500792e-2 / 20.0, 3.2888e-4), EXACT);
+    assert_terms(&terms(&found, 2), &flicker(3.9617500792e-2 / 20.0, 4.2888e-4), EXACT);
+    // an early version of the same program wrote N itself
+    let out = bench.run("import early.yaml --rate 400 -o early.json --accelerometer force.json");
+    assert!(out.status == 0 && out.stderr.contains("would lie below gyr_w"), "{}", out.stderr);
+    let early = params(&bench, "early.json");
     for (i, (n, w)) in
         [(1.03126e-4, 3.37658e-5), (1.07871e-4, 3.19706e-5), (9.95403e-5, 2.25795e-5)].into_iter().enumerate()
     {
-        let floor = (2.0 * LN_2 / PI).sqrt();
-        let expected = [Term::White { density: n / 20.0 }, Term::BiasInstability { coefficient: w / floor }];
-        assert_terms(&terms(&found, i), &expected, EXACT);
+        assert_terms(&terms(&early, i), &flicker(n, w), EXACT);
     }
+    assert_terms(&terms(&params(&bench, "force.json"), 1), &flicker(1.39850e-3, 6.32492e-4), EXACT);
+    bench.ok("import deviations.yaml --rate 400 --accelerometer force.json");
+    assert_terms(&terms(&params(&bench, "force.json"), 1), &flicker(4.0e-2 / 20.0, 6.32492e-4), EXACT);
     assert_eq!(found.axes.iter().map(|a| a.name.as_str()).collect::<Vec<_>>(), ["x", "y", "z"]);
     assert_eq!(params(&bench, "force.json").axes.len(), 3, "the average stands for three");
     bench.ok("import densities.yaml --rate 400 -o densities.json --accelerometer force.json");
@@ -377,6 +414,32 @@ fn sums_of_processes_have_honest_intervals() {
         let inside = found.iter().filter(|f| f[i].0.abs() < 1.96 * f[i].1).count();
         assert!(inside >= 32, "{i}: {inside} of 40");
     }
+}
+
+/// A process that forgets within three samples counts as white noise: its spectrum at zero is σ²(1 + a)/(1 − a) dt. Twenty logs of 20,000 samples: all
+/// within five standard deviations (1e-5), and their mean square of the expected size (χ² of 20 outside 8 … 45: 1e-3).
+#[test]
+fn fast_processes_are_white_noise() {
+    use rayon::prelude::*;
+    let unit = Unit::parse("rad/s").unwrap();
+    let choice = parse_model("white+gm").unwrap();
+    let a = (-1.0f64 / 3.0).exp();
+    let truth = (0.3f64.powi(2) + (1.0 + a) / (1.0 - a)).sqrt();
+    let scores: Vec<f64> = (100..120u64)
+        .into_par_iter()
+        .map(|run| {
+            let sums = identify_axis("z", &log(0.3, 1.0, 3.0, 20_000, run), 1.0, &unit, Method::Likelihood, &choice)
+                .unwrap()
+                .sums;
+            assert!(sums.walk.is_none(), "{sums:?}");
+            let white = sums.white.unwrap();
+            let [low, high] = white.interval.unwrap();
+            (white.value / truth).ln() / ((high / low).ln() / 3.92)
+        })
+        .collect();
+    assert!(scores.iter().all(|z| z.abs() < 5.0), "{scores:?}");
+    let sum: f64 = scores.iter().map(|z| z * z).sum();
+    assert!((8.0..45.0).contains(&sum), "{sum}: {scores:?}");
 }
 
 /// An hour of the reference sensor at 10 Hz beside its own numbers as other programs hold them, and beside wrong ones.

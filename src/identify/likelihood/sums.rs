@@ -19,7 +19,7 @@ pub struct Sum {
 /// Over all processes of a fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sums {
-    /// N² = Σ N_i² + Σ 2σ²Tc of the Gauss-Markov processes that forget within ten samples: a matter of bandwidth.
+    /// N² = Σ N_i² + Σ σ²dt coth(dt/2Tc), the spectrum at f = 0 of the Gauss-Markov processes that forget within ten samples: a matter of bandwidth.
     pub white: Option<Sum>,
     /// K² = Σ K_i² + Σ 2σ²/Tc of the others; none with flicker, whose growth has no limit.
     pub walk: Option<Sum>,
@@ -39,7 +39,8 @@ pub(super) fn sums(data: &Ordinates, fit: &Fit, information: Option<&DMatrix<f64
             (Piece::White | Piece::MovingAverage(_), &[n]) => white.push((n * n, vec![(at, 2.0)])),
             (Piece::RandomWalk, &[k]) => walk.push((k * k, vec![(at, 2.0)])),
             (Piece::GaussMarkov, &[sigma, time]) if time < FAST * data.dt => {
-                white.push((2.0 * sigma * sigma * time, vec![(at, 2.0), (at + 1, 1.0)]));
+                let x = data.dt / time;
+                white.push((sigma * sigma * data.dt / (0.5 * x).tanh(), vec![(at, 2.0), (at + 1, x / x.sinh())]));
             }
             (Piece::GaussMarkov, &[sigma, time]) => {
                 walk.push((2.0 * sigma * sigma / time, vec![(at, 2.0), (at + 1, -1.0)]));

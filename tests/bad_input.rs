@@ -3,6 +3,7 @@
 //! One table per kind of file; a row is what is wrong, the command, and words that the line must contain.
 
 mod attitude;
+mod code;
 mod import;
 mod temperature;
 

@@ -9,6 +9,7 @@ mod architecture;
 mod attitude;
 mod bad_input;
 mod cli;
+mod code;
 mod compare;
 mod consistency;
 mod deployment;

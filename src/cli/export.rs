@@ -1,5 +1,7 @@
 //! `kfdesign export`.
 
+mod code;
+
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
@@ -13,18 +15,19 @@ use crate::params::Params;
 use crate::tune::walk_price;
 use crate::units::{Dimension, Quantity};
 
-/// Noise parameters in the files and units of other programs
+/// Noise parameters in the files and units of other programs; a filter as source code in C or Rust
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example: kfdesign export params.json --to kalibr --accelerometer accelerometer.json --inflate 10 -o imu.yaml"
+    after_help = "Examples: kfdesign export params.json --to kalibr --accelerometer accelerometer.json --inflate 10 -o imu.yaml\n          kfdesign export filter.json --to c --precision float -o drift.c"
 )]
 pub struct Args {
-    /// Noise parameters of a gyro or an accelerometer
+    /// Noise parameters of a gyro or an accelerometer; filter.json for c and rust
+    #[arg(value_name = "FILE")]
     params: PathBuf,
     /// Whose file it is
     #[arg(long, value_enum, value_name = "TARGET")]
     to: TargetFlag,
-    /// The file [default: stdout]
+    /// The file [default: stdout]. c: NAME.c, which gets NAME.h and NAME_test.c beside it; NAME begins the names of types and functions
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Noise parameters of the other sensor of the unit
@@ -36,12 +39,16 @@ pub struct Args {
     /// Multiply every white density and every drift; written beside the identified numbers
     #[arg(long, value_name = "FACTOR")]
     inflate: Option<f64>,
-    /// Where the file has one number for three axes: worst, mean (root mean square) or the name of an axis
-    #[arg(long, value_name = "AXIS", default_value = "worst")]
-    axis: String,
+    /// Where the file has one number for three axes: worst, mean (root mean square) or the name of an axis [default: worst]. c, rust: the one axis
+    /// to write [default: all]
+    #[arg(long, value_name = "AXIS")]
+    axis: Option<String>,
     /// Where the file knows no other drift than a random walk: short (the growth over short times) or horizon=60s (the growth over that time)
-    #[arg(long, value_name = "RULE", default_value = "short")]
-    walk: String,
+    /// [default: short]
+    #[arg(long, value_name = "RULE")]
+    walk: Option<String>,
+    #[command(flatten)]
+    code: code::Flags,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -57,11 +64,17 @@ enum TargetFlag {
     GnssInsSim,
     Navego,
     Gazebo,
+    /// A filter as a C99 header and source
+    C,
+    /// A filter as a no_std module of Rust
+    Rust,
 }
 
 impl TargetFlag {
-    fn target(self) -> Target {
-        match self {
+    /// `None`: the filter as code.
+    fn target(self) -> Option<Target> {
+        Some(match self {
+            TargetFlag::C | TargetFlag::Rust => return None,
             TargetFlag::Kalibr => Target::Kalibr,
             TargetFlag::Openvins => Target::OpenVins,
             TargetFlag::Vins => Target::Vins,
@@ -73,24 +86,26 @@ impl TargetFlag {
             TargetFlag::GnssInsSim => Target::GnssInsSim,
             TargetFlag::Navego => Target::NaveGo,
             TargetFlag::Gazebo => Target::Gazebo,
-        }
+        })
     }
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
+    let Some(target) = args.to.target() else { return code::run(args) };
+    args.code.refuse()?;
     for (name, value) in [("--rate", args.rate), ("--inflate", args.inflate)] {
         if let Some(value) = value.filter(|v| !(*v > 0.0 && v.is_finite())) {
             bail!("{name} {value}: expected a number above zero");
         }
     }
-    let walk = walk(&args.walk)?;
+    let walk = walk(args.walk.as_deref().unwrap_or("short"))?;
     let mut export = Export {
         gyro: None,
         accelerometer: None,
         rate_hz: args.rate,
         sample_rate_hz: 0.0,
         inflation: args.inflate.unwrap_or(1.0),
-        choice: match args.axis.as_str() {
+        choice: match args.axis.as_deref().unwrap_or("worst") {
             "worst" => Choice::Worst,
             "mean" => Choice::Mean,
             name => Choice::Axis(name.to_owned()),
@@ -114,7 +129,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         }
         add(&mut export, path, &params)?;
     }
-    let written = write(args.to.target(), &export).map_err(|message| anyhow!(message))?;
+    let written = write(target, &export).map_err(|message| anyhow!(message))?;
     for warning in &written.warnings {
         eprintln!("  warning: {warning}");
     }

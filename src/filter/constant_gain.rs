@@ -50,6 +50,17 @@ impl ConstantGain {
         &self.kalman.p
     }
 
+    /// K and S of a measurement.
+    pub fn gain(&self, index: usize) -> (&DVector<f64>, f64) {
+        let (gain, variance) = &self.gains[index];
+        (gain, *variance)
+    }
+
+    /// As [`Kalman::drive`].
+    pub fn drive(&mut self, u: &[f64]) {
+        self.kalman.drive(u);
+    }
+
     /// As [`Kalman::advance`], x alone.
     pub fn advance(&mut self, steps: u64, input: Option<f64>) {
         if steps == 1 {

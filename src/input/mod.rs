@@ -495,7 +495,7 @@ pub fn read(path: &Path, options: &LogOptions) -> Result<(Recording, LogCheck), 
 }
 
 /// Hex SHA-256 of the file's bytes as stored.
-fn sha256(path: &Path) -> Result<String, InputError> {
+pub fn sha256(path: &Path) -> Result<String, InputError> {
     let fail = |error: std::io::Error| InputError { message: format!("{}: cannot read: {error}", path.display()) };
     let mut file = std::fs::File::open(path).map_err(fail)?;
     let mut hash = Sha256::new();

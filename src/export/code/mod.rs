@@ -124,7 +124,7 @@ pub fn check_name(name: &str) -> Result<(), String> {
     ))
 }
 
-/// NAME.h, NAME.c and NAME_test.c. Errors: see [`Part`].
+/// NAME.h, NAME.c and NAME_test.c. Errors: a name that will not do, over 255 states, nothing that is measured, a number that single precision does not carry.
 pub fn c(design: &FilterDesign, code: &Code) -> Result<Vec<Source>, String> {
     let sheet = sheet(design, code, Language::C)?;
     Ok(vec![
@@ -134,7 +134,7 @@ pub fn c(design: &FilterDesign, code: &Code) -> Result<Vec<Source>, String> {
     ])
 }
 
-/// NAME.rs. Errors: see [`Part`].
+/// NAME.rs. Errors: as [`c`].
 pub fn rust(design: &FilterDesign, code: &Code) -> Result<Source, String> {
     let sheet = sheet(design, code, Language::Rust)?;
     Ok(Source { suffix: ".rs", text: render(include_str!("templates/module.rs.jinja"), &sheet)? })

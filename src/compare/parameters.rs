@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{CompareError, Log, LogAxis, paired};
-use crate::identify::{Identified, Method, ModelChoice, Sum, identify_axis};
+use crate::identify::{Identified, Method, ModelChoice, Sum, counts_as_white, identify_axis};
 use crate::noise::{Kind, Term};
 use crate::params::{AxisParams, Measured, Params, TermEntry};
 use crate::units::{Unit, digits};
@@ -72,7 +72,7 @@ fn of_axis(axis: &AxisParams, log: &LogAxis, dt: f64, display: &Unit) -> Result<
     let drifts: Vec<&TermEntry> = file.terms.iter().filter(|t| t.to_term().kind().is_drift()).collect();
     let walk_only = matches!(drifts[..], [TermEntry::RateRandomWalk { .. }]);
     let mut rows = Vec::new();
-    if let Some((value, unit)) = white(&file) {
+    if let Some((value, unit)) = white(&file, dt) {
         let estimate = found.sums.white.map(|sum| of_sum(sum, format!("white noise of {}", label(&found))));
         rows.push(beside(&file.name, "white.density", unit.from_si(value), &unit, estimate, String::new()));
     }
@@ -112,13 +112,14 @@ fn time(term: &TermEntry) -> f64 {
     }
 }
 
-/// All white noise at low frequencies, SI, with the unit of the first.
-fn white(file: &AxisParams) -> Option<(f64, Unit)> {
+/// All that counts as white noise, at low frequencies, SI, with the unit of the first.
+fn white(file: &AxisParams, dt: f64) -> Option<(f64, Unit)> {
     let unit = file.terms.iter().find_map(|term| match term {
         TermEntry::White { density } | TermEntry::MovingAverage { density, .. } => Some(density.unit.clone()),
         _ => None,
     })?;
-    Some((file.noise().wideband_density(), unit))
+    let square: f64 = file.noise().terms.iter().filter(|t| counts_as_white(t, dt)).map(|t| t.psd(0.0, dt)).sum();
+    Some((square.sqrt(), unit))
 }
 
 /// Of the file's terms, as a log can be asked for them; white noise is part of every model.

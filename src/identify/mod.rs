@@ -21,7 +21,7 @@ use crate::numerics::reduce::mean;
 use crate::params::{AxisParams, Measured, NotIdentified, TermEntry};
 use crate::units::{Unit, digits};
 pub use likelihood::shared::{SharedTime, TimeProfile, shared_time};
-pub use likelihood::sums::{Sum, Sums};
+pub use likelihood::sums::{Sum, Sums, counts_as_white};
 use points::Distance;
 
 /// How parameters are taken from a log.

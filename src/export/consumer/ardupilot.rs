@@ -17,14 +17,14 @@ pub(super) fn write(export: &Export) -> Result<Written, String> {
         (Quantity::SpecificForce, "EK3_ACC_P_NSE", [0.01, 1.0], "EK3_ABIAS_P_NSE", [0.00001, 0.02]),
     ];
     for (quantity, white_name, white_range, walk_name, walk_range) in sensors {
-        match (export.white(quantity)?, export.walk(quantity)?) {
-            (Some(white), Some(walk)) => {
+        match export.white_and_walk(quantity)? {
+            Some((white, walk)) => {
                 for (name, value, [low, high]) in [(white_name, white, white_range), (walk_name, walk, walk_range)] {
                     let value = clamped(name, value / dt.sqrt(), low, high, &mut warnings);
                     text.push_str(&format!("{name},{}\n", plain(value)));
                 }
             }
-            _ => warnings.push(missing(
+            None => warnings.push(missing(
                 &format!(
                     "no {}: its parameters are not written",
                     if quantity == Quantity::AngularRate { "gyro" } else { "accelerometer" }

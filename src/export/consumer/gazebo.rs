@@ -13,7 +13,7 @@ pub(super) fn write(export: &Export) -> Result<Written, String> {
     for (quantity, name, prefix) in
         [(Quantity::AngularRate, "gyroscope", "gyroscope"), (Quantity::SpecificForce, "accelerometer", "accelerometer")]
     {
-        let (Some(white), Some(walk)) = (export.white(quantity)?, export.walk(quantity)?) else {
+        let Some((white, walk)) = export.white_and_walk(quantity)? else {
             warnings.push(missing(&format!("the {name} is missing"), "its parameters"));
             continue;
         };

@@ -15,8 +15,8 @@ pub(super) fn write(export: &Export) -> Result<Written, String> {
         (Quantity::SpecificForce, "Accelerometer", "BiasAcc", "m^2/s^4/Hz", "m^2/s^6/Hz"),
     ];
     for (quantity, white_name, walk_name, white_unit, walk_unit) in sensors {
-        match (export.white(quantity)?, export.walk(quantity)?) {
-            (Some(white), Some(walk)) => {
+        match export.white_and_walk(quantity)? {
+            Some((white, walk)) => {
                 text.push_str(&format!(
                     "params.set{white_name}Covariance({} * np.eye(3))  # {white_unit}\n",
                     exponent(white * white)
@@ -26,7 +26,7 @@ pub(super) fn write(export: &Export) -> Result<Written, String> {
                     exponent(walk * walk)
                 ));
             }
-            _ => warnings.push(missing(&format!("the {} is missing", white_name.to_lowercase()), "its parameters")),
+            None => warnings.push(missing(&format!("the {} is missing", white_name.to_lowercase()), "its parameters")),
         }
     }
     text.push_str("params.setIntegrationCovariance(1e-8 * np.eye(3))\n");

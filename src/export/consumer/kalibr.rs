@@ -23,8 +23,8 @@ pub(super) fn four(export: &Export, indent: &str, text: &mut String, warnings: &
         (Quantity::SpecificForce, "accelerometer", "--accelerometer PARAMS"),
     ] {
         let unit = quantity.si_unit();
-        match (export.white(quantity)?, export.walk(quantity)?) {
-            (Some(white), Some(walk)) => {
+        match export.white_and_walk(quantity)? {
+            Some((white, walk)) => {
                 if walk == 0.0 {
                     warnings.push(format!(
                         "{name}_random_walk is 0: no drift was identified, and the reader refuses a zero"
@@ -33,7 +33,7 @@ pub(super) fn four(export: &Export, indent: &str, text: &mut String, warnings: &
                 text.push_str(&format!("{indent}{name}_noise_density: {}  # {unit}/sqrt(Hz)\n", exponent(white)));
                 text.push_str(&format!("{indent}{name}_random_walk: {}  # {}\n", exponent(walk), walk_unit(quantity)));
             }
-            _ => {
+            None => {
                 warnings.push(format!("the {name} is missing, and the reader needs it: give {flag}"));
                 text.push_str(&format!(
                     "# {indent}{name}_noise_density:  # missing\n# {indent}{name}_random_walk:  # missing\n"

@@ -94,6 +94,11 @@ impl Export {
         self.one(quantity, |numbers| numbers.walk.value)
     }
 
+    /// Both, where the sensor is there.
+    fn white_and_walk(&self, quantity: Quantity) -> Result<Option<(f64, f64)>, String> {
+        Ok(self.white(quantity)?.zip(self.walk(quantity)?))
+    }
+
     fn one(&self, quantity: Quantity, of: impl Fn(&Numbers) -> f64) -> Result<Option<f64>, String> {
         let inflated = |value: f64| value * self.inflation;
         self.sensor(quantity).map(|sensor| sensor.one(&self.choice, of).map(inflated)).transpose()
@@ -219,6 +224,14 @@ fn clamped(name: &str, value: f64, low: f64, high: f64, warnings: &mut Vec<Strin
         ));
     }
     inside
+}
+
+/// What is said of a sensor that is not there.
+fn lacking(quantity: Quantity) -> String {
+    match quantity {
+        Quantity::AngularRate => "the gyro is missing: give its parameters".into(),
+        Quantity::SpecificForce => "the accelerometer is missing: give --accelerometer PARAMS".into(),
+    }
 }
 
 /// A refusal of a file for two kinds of sensors when one is missing.

@@ -1,7 +1,7 @@
 //! ORB-SLAM3 yaml. Source: UZ-SLAMLab/ORB_SLAM3, src/ImuTypes.cc, Settings.cc: white times √IMU.Frequency, walk over it, so that field must be the true
 //! rate; numbers must be real (with a decimal point).
 
-use super::{Export, Written, exponent, walk_unit};
+use super::{Export, Written, exponent, lacking, walk_unit};
 use crate::units::Quantity;
 
 pub(super) fn write(export: &Export) -> Result<Written, String> {
@@ -14,19 +14,16 @@ pub(super) fn write(export: &Export) -> Result<Written, String> {
         ],
     ));
     let mut warnings = Vec::new();
-    let sensors = [
-        (Quantity::AngularRate, "Gyro", "the gyro is missing: give its parameters"),
-        (Quantity::SpecificForce, "Acc", "the accelerometer is missing: give --accelerometer PARAMS"),
-    ];
-    for (quantity, name, complaint) in sensors {
+    let sensors = [(Quantity::AngularRate, "Gyro"), (Quantity::SpecificForce, "Acc")];
+    for (quantity, name) in sensors {
         let unit = quantity.si_unit();
-        match (export.white(quantity)?, export.walk(quantity)?) {
-            (Some(white), Some(walk)) => {
+        match export.white_and_walk(quantity)? {
+            Some((white, walk)) => {
                 text.push_str(&format!("IMU.Noise{name}: {}  # {unit}/sqrt(Hz)\n", exponent(white)));
                 text.push_str(&format!("IMU.{name}Walk: {}  # {}\n", exponent(walk), walk_unit(quantity)));
             }
-            _ => {
-                warnings.push(complaint.to_owned());
+            None => {
+                warnings.push(lacking(quantity));
                 text.push_str(&format!("# IMU.Noise{name}:  # missing\n# IMU.{name}Walk:  # missing\n"));
             }
         }

@@ -19,14 +19,14 @@ pub(super) fn write(export: &Export) -> Result<Written, String> {
         text.push_str(&format!("1\t1\t{name}\t{}\t9\n", plain(value)));
     };
     let root = dt.sqrt();
-    if let (Some(white), Some(walk)) = (export.white(Quantity::AngularRate)?, export.walk(Quantity::AngularRate)?) {
+    if let Some((white, walk)) = export.white_and_walk(Quantity::AngularRate)? {
         put("EKF2_GYR_NOISE", white / root, 0.0001, 0.1);
         put("EKF2_GYR_B_NOISE", walk / root, 0.0, 0.01);
         if let Some(turn_on) = export.one(Quantity::AngularRate, |n| n.turn_on.unwrap_or(0.0))?.filter(|v| *v > 0.0) {
             put("EKF2_GBIAS_INIT", turn_on / export.inflation, 0.0, 0.2);
         }
     }
-    if let (Some(white), Some(walk)) = (export.white(Quantity::SpecificForce)?, export.walk(Quantity::SpecificForce)?) {
+    if let Some((white, walk)) = export.white_and_walk(Quantity::SpecificForce)? {
         put("EKF2_ACC_NOISE", white / root, 0.01, 1.0);
         put("EKF2_ACC_B_NOISE", walk / root, 0.0, 0.01);
         if let Some(turn_on) = export.one(Quantity::SpecificForce, |n| n.turn_on.unwrap_or(0.0))?.filter(|v| *v > 0.0) {

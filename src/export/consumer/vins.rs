@@ -1,7 +1,7 @@
 //! VINS-Mono and VINS-Fusion yaml. Source: HKUST-Aerial-Robotics/VINS-Fusion, vins_estimator/src/factor/integration_base.h: per step the angle has the
 //! variance ½ dt² gyr_n² and the bias dt² gyr_w². Physical are N² dt and K² dt, so gyr_n = N √(2/dt) and gyr_w = K/√dt.
 
-use super::{Export, Written, exponent};
+use super::{Export, Written, exponent, lacking};
 use crate::units::Quantity;
 
 pub(super) fn write(export: &Export) -> Result<Written, String> {
@@ -17,18 +17,15 @@ pub(super) fn write(export: &Export) -> Result<Written, String> {
         ],
     ));
     let mut warnings = Vec::new();
-    let sensors = [
-        (Quantity::SpecificForce, "acc", "the accelerometer is missing: give --accelerometer PARAMS"),
-        (Quantity::AngularRate, "gyr", "the gyro is missing: give its parameters"),
-    ];
-    for (quantity, name, complaint) in sensors {
-        match (export.white(quantity)?, export.walk(quantity)?) {
-            (Some(white), Some(walk)) => {
+    let sensors = [(Quantity::SpecificForce, "acc"), (Quantity::AngularRate, "gyr")];
+    for (quantity, name) in sensors {
+        match export.white_and_walk(quantity)? {
+            Some((white, walk)) => {
                 text.push_str(&format!("{name}_n: {}\n", exponent(white * (2.0 * rate).sqrt())));
                 text.push_str(&format!("{name}_w: {}\n", exponent(walk * rate.sqrt())));
             }
-            _ => {
-                warnings.push(complaint.to_owned());
+            None => {
+                warnings.push(lacking(quantity));
                 text.push_str(&format!("# {name}_n:  # missing\n# {name}_w:  # missing\n"));
             }
         }

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::log_flags::{LogFlags, print_check};
 use super::output::{digits, print_json, print_text, progress, table};
-use super::stretch::{Stretch, stretches};
+use super::stretch::{Stretch, into_stretches};
 use super::{Status, allan_figure};
 use crate::allan::{self, AllanCurve, Deviation, NoiseType, TauGrid};
 use crate::export::atomic;
@@ -210,13 +210,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
 
 /// The log in memory at once.
 fn whole(args: &Args, options: &LogOptions) -> anyhow::Result<(Header, Vec<AxisCurve>)> {
-    let (recording, check) = crate::input::read(&args.log, options)?;
+    let (mut recording, check) = crate::input::read(&args.log, options)?;
     print_check(&recording.name, &check);
     let (dt, kind) = (recording.dt(), args.deviation.kind());
-    let parts = stretches(&recording, options.kind);
+    let parts = into_stretches(&mut recording, options.kind);
     let header =
         Header { name: recording.name, quantity: recording.quantity, sample_rate_hz: recording.sample_rate_hz, check };
-    drop(recording.axes);
     let bar = progress(parts.len() as u64, "Allan deviation");
     let axes = parts
         .into_par_iter()

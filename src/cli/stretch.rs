@@ -1,11 +1,14 @@
 //! The part of a log that Allan and spectral methods use: per axis the longest stretch without gaps and unusable
 //! samples, as rate whatever the log holds.
 
+use std::borrow::Cow;
 use std::ops::Range;
+
+use rayon::prelude::*;
 
 use crate::filter;
 use crate::input::InputKind;
-use crate::signal::{Gap, Recording, upsets};
+use crate::signal::{Axis, Gap, Recording, upsets};
 use crate::units::Unit;
 
 /// One axis, SI.
@@ -83,22 +86,29 @@ impl Stretch {
 
 /// The stretches of all axes; increments are divided by the sample period, angles differenced and divided.
 pub(super) fn stretches(recording: &Recording, kind: InputKind) -> Vec<Stretch> {
-    let dt = recording.dt();
-    let cuts: Vec<usize> = recording.gaps.iter().map(|gap| gap.index).collect();
-    recording
-        .axes
-        .iter()
-        .map(|axis| {
-            let range = longest(&axis.values, &cuts);
-            let left_out = axis.values.len() - range.len();
-            let of = |values: &[f64]| rate(values, kind, dt);
-            let whole = if left_out > 0 { pieces(&axis.values, &recording.gaps, kind, of) } else { Vec::new() };
-            let values = axis.values.get(range.clone()).unwrap_or_default();
-            let phase = (kind == InputKind::Angle).then(|| values.to_vec());
-            let unit = if kind == InputKind::Rate { axis.unit.clone() } else { axis.unit.times_time(-2) };
-            Stretch { name: axis.name.clone(), unit, rate: of(values), phase, left_out, range, whole }
-        })
-        .collect()
+    let of = |axis: &Axis| stretch(&axis.name, &axis.unit, Cow::Borrowed(&axis.values), recording, kind);
+    recording.axes.par_iter().map(of).collect()
+}
+
+/// The same, leaving no axes: a rate in one piece is not copied.
+pub(super) fn into_stretches(recording: &mut Recording, kind: InputKind) -> Vec<Stretch> {
+    let axes = std::mem::take(&mut recording.axes);
+    let of = |axis: Axis| stretch(&axis.name, &axis.unit, Cow::Owned(axis.values), recording, kind);
+    axes.into_par_iter().map(of).collect()
+}
+
+fn stretch(name: &str, unit: &Unit, values: Cow<'_, [f64]>, recording: &Recording, kind: InputKind) -> Stretch {
+    let (dt, gaps) = (recording.dt(), &recording.gaps);
+    let cuts: Vec<usize> = gaps.iter().map(|gap| gap.index).collect();
+    let range = longest(&values, &cuts);
+    let left_out = values.len() - range.len();
+    let of = |values: &[f64]| rate(values, kind, dt);
+    let whole = if left_out > 0 { pieces(&values, gaps, kind, of) } else { Vec::new() };
+    let own = &values[range.clone()];
+    let phase = (kind == InputKind::Angle).then(|| own.to_vec());
+    let unit = if kind == InputKind::Rate { unit.clone() } else { unit.times_time(-2) };
+    let rate = if kind == InputKind::Rate && left_out == 0 { values.into_owned() } else { of(own) };
+    Stretch { name: name.to_string(), unit, rate, phase, left_out, range, whole }
 }
 
 /// Increments and angles as rate.
@@ -133,6 +143,9 @@ fn pieces(values: &[f64], gaps: &[Gap], kind: InputKind, of: impl Fn(&[f64]) -> 
 
 /// Longest run of finite values that does not reach over a cut (index of the first sample after it).
 fn longest(values: &[f64], cuts: &[usize]) -> Range<usize> {
+    if cuts.is_empty() && values.iter().fold(true, |all, value| all & value.is_finite()) {
+        return 0..values.len();
+    }
     let mut best = 0..0;
     let mut start = 0;
     let mut cuts = cuts.iter().copied().peekable();

@@ -159,6 +159,12 @@ trait Table {
     fn next_rows(&mut self, rows: &mut Rows) -> Result<bool, InputError>;
 }
 
+fn to_si(unit: &Unit, values: &mut [f64]) {
+    if unit.to_si(1.0) != 1.0 {
+        values.iter_mut().for_each(|x| *x = unit.to_si(*x));
+    }
+}
+
 /// The rows between `--start` and `--end`: from the first row at or after the start to the last before one beyond the end.
 #[derive(Clone, Debug)]
 struct Selection {
@@ -258,7 +264,7 @@ impl Log {
             return Ok(None);
         }
         if let Some((column, unit)) = &self.choice.time {
-            rows.time.iter_mut().for_each(|t| *t = unit.to_si(*t));
+            to_si(unit, &mut rows.time);
             if self.stamped()
                 && rows.time.iter().fold(false, |empty, t| empty | !t.is_finite())
                 && let Some(empty) = rows.time.iter().position(|t| !t.is_finite())
@@ -279,7 +285,7 @@ impl Log {
         let beside = self.choice.temperature.column.as_ref().map(|(_, info)| &info.unit);
         let units = self.choice.axes.iter().map(|axis| &axis.unit).chain(&self.choice.extra).chain(beside);
         for (column, unit) in rows.values.iter_mut().zip(units) {
-            column.iter_mut().for_each(|x| *x = unit.to_si(*x));
+            to_si(unit, column);
         }
         let stamped = self.stamped();
         let rate = self.options.rate_hz.unwrap_or(f64::NAN);

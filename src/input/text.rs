@@ -56,7 +56,9 @@ fn fail<T>(path: &Path, what: impl std::fmt::Display) -> Result<T, InputError> {
 }
 
 fn open(path: &Path) -> Result<Source, InputError> {
-    const BUFFER: usize = 1 << 18;
+    // less than a chunk, which is then read without a copy
+    const BUFFER: usize = 1 << 16;
+    const UNPACKED: usize = 1 << 18;
     let file = match File::open(path) {
         Ok(file) => file,
         Err(error) => return fail(path, format!("cannot read: {error}")),
@@ -64,8 +66,8 @@ fn open(path: &Path) -> Result<Source, InputError> {
     let mut reader = BufReader::with_capacity(BUFFER, file);
     match reader.fill_buf() {
         Ok([0x1f, 0x8b, ..]) => {
-            let reader = Box::new(BufReader::with_capacity(BUFFER, MultiGzDecoder::new(reader)));
-            Ok(Source { reader, step: BUFFER / 2 })
+            let reader = Box::new(BufReader::with_capacity(UNPACKED, MultiGzDecoder::new(reader)));
+            Ok(Source { reader, step: UNPACKED / 2 })
         }
         Ok(_) => Ok(Source { reader: Box::new(reader), step: usize::MAX }),
         Err(error) => fail(path, format!("cannot read: {error}")),

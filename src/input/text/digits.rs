@@ -28,8 +28,8 @@ const fn powers<const N: usize>(base: u64) -> [u64; N] {
 
 /// What is done to many bytes at once. Integers only: every way gives the same.
 pub(super) trait Bytes: Copy {
-    /// One bit for each byte that is a separator or the end of a line, and one for each quote.
-    fn ends(self, block: &[u8; 64], separators: [u8; 2]) -> (u64, u64);
+    /// One bit for each byte that is a separator or the end of a line, for each end of a line, and for each quote.
+    fn ends(self, block: &[u8; 64], separators: [u8; 2]) -> (u64, u64, u64);
     /// One bit for each byte that is no digit.
     fn others(self, text: &[u8; 32]) -> u32;
     /// The last `count` bytes, which are digits, as a number.
@@ -51,8 +51,8 @@ fn high_bits(word: u64) -> u64 {
 
 impl Bytes for Words {
     #[inline(always)]
-    fn ends(self, block: &[u8; 64], separators: [u8; 2]) -> (u64, u64) {
-        let (mut ends, mut quotes) = (0, 0);
+    fn ends(self, block: &[u8; 64], separators: [u8; 2]) -> (u64, u64, u64) {
+        let (mut ends, mut feeds, mut quotes) = (0, 0, 0);
         for (i, word) in block.as_chunks::<8>().0.iter().enumerate() {
             // the high bit of a byte that is zero: no carry from 7 bits plus 127
             let is = |byte: u8| {
@@ -60,9 +60,10 @@ impl Bytes for Words {
                 !(((x & LOW) + LOW) | x)
             };
             ends |= high_bits(is(separators[0]) | is(separators[1]) | is(b'\n')) << (8 * i);
+            feeds |= high_bits(is(b'\n')) << (8 * i);
             quotes |= high_bits(is(b'"')) << (8 * i);
         }
-        (ends, quotes)
+        (ends, feeds, quotes)
     }
     #[inline(always)]
     fn others(self, text: &[u8; 32]) -> u32 {
@@ -83,18 +84,19 @@ impl Bytes for Words {
 #[cfg(target_arch = "x86_64")]
 impl Bytes for pulp::x86::V3 {
     #[inline(always)]
-    fn ends(self, block: &[u8; 64], separators: [u8; 2]) -> (u64, u64) {
+    fn ends(self, block: &[u8; 64], separators: [u8; 2]) -> (u64, u64, u64) {
         let each = |byte: u8| self.avx._mm256_set1_epi8(byte as i8);
-        let (mut ends, mut quotes) = (0, 0);
+        let (mut ends, mut feeds, mut quotes) = (0, 0, 0);
         for (i, half) in block.as_chunks::<32>().0.iter().enumerate() {
             let is = |byte: u8| self.avx2._mm256_cmpeq_epi8(pulp::cast(*half), each(byte));
             let either = self.avx2._mm256_or_si256(is(separators[0]), is(separators[1]));
-            let end = self.avx2._mm256_or_si256(either, is(b'\n'));
+            let feed = is(b'\n');
             let bits = |x| u64::from(self.avx2._mm256_movemask_epi8(x) as u32) << (32 * i);
-            ends |= bits(end);
+            ends |= bits(self.avx2._mm256_or_si256(either, feed));
+            feeds |= bits(feed);
             quotes |= bits(is(b'"'));
         }
-        (ends, quotes)
+        (ends, feeds, quotes)
     }
     #[inline(always)]
     fn others(self, text: &[u8; 32]) -> u32 {

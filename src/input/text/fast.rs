@@ -59,7 +59,7 @@ impl Lines {
             let whole = rows.lines.len();
             // no closures here: they would not be compiled for the instructions of `simd`
             let fields = match self.ends(simd, form.delimiter, bytes, from, last + 1) {
-                Some(count) => Fields::new(form, bytes, from, &self.ends[..count]),
+                Some((lines, count)) => Fields::new(form, bytes, lines, &self.ends[..count]),
                 None => None,
             };
             let read = match &fields {
@@ -81,22 +81,30 @@ impl Lines {
         (lines, None)
     }
 
-    /// Where the fields of these lines end; how many there are. `None` if there is a quote.
+    /// Where the fields of these lines end, behind where they begin less one; how many
+    /// lines there are, and how many of these places. `None` if there is a quote.
     #[inline(always)]
-    fn ends(&mut self, simd: impl Bytes, delimiter: Delimiter, text: &[u8], from: usize, end: usize) -> Option<usize> {
+    fn ends(
+        &mut self,
+        simd: impl Bytes,
+        delimiter: Delimiter,
+        text: &[u8],
+        from: usize,
+        end: usize,
+    ) -> Option<(usize, usize)> {
         let separators = match delimiter {
             Delimiter::Byte(byte) => [byte, byte],
             Delimiter::Spaces => [b' ', b'\t'],
         };
-        self.ends.resize(self.ends.len().max(end - from + 64), 0);
-        let mut count = 0;
+        self.ends.resize(self.ends.len().max(end - from + 65), 0);
+        self.ends[0] = from as u32 - 1;
+        let (mut lines, mut count) = (0, 1);
         for (at, block) in (from..end).step_by(64).zip(text[from..].as_chunks::<64>().0) {
-            let (mut ends, mut quotes) = simd.ends(block, separators);
-            if end - at < 64 {
-                let inside = (1 << (end - at)) - 1;
-                (ends, quotes) = (ends & inside, quotes & inside);
-            }
-            if quotes != 0 {
+            let inside = if end - at < 64 { (1 << (end - at)) - 1 } else { !0 };
+            let (ends, feeds, quotes) = simd.ends(block, separators);
+            let mut ends = ends & inside;
+            lines += (feeds & inside).count_ones() as usize;
+            if quotes & inside != 0 {
                 return None;
             }
             let places = self.ends[count..].first_chunk_mut::<64>()?;
@@ -112,7 +120,7 @@ impl Lines {
                 }
             }
         }
-        Some(count)
+        Some((lines, count))
     }
 }
 
@@ -163,11 +171,12 @@ impl pulp::NullaryFnOnce for Reading<'_> {
 struct Fields<'a> {
     form: &'a Form,
     text: &'a [u8],
-    from: usize,
+    /// The byte before the first line, and the end of every field.
     ends: &'a [u32],
     rows: usize,
     /// Of one row: one more than columns where a separator stands behind each row.
     count: usize,
+    point: u8,
 }
 
 /// Sign, digits before the point, digits behind it, and how many.
@@ -181,30 +190,35 @@ struct Decimal {
 impl<'a> Fields<'a> {
     /// `None` if the lines are not alike.
     #[inline(always)]
-    fn new(form: &'a Form, text: &'a [u8], from: usize, ends: &'a [u32]) -> Option<Self> {
+    fn new(form: &'a Form, text: &'a [u8], lines: usize, ends: &'a [u32]) -> Option<Self> {
         let columns = form.slots.len();
         let is_last = |end: &u32| text[*end as usize] == b'\n';
-        let count = ends.iter().take(columns + 1).position(is_last)? + 1;
-        if count < columns || !ends.len().is_multiple_of(count) {
+        let count = ends.iter().skip(1).take(columns + 1).position(is_last)? + 1;
+        if count < columns || !(ends.len() - 1).is_multiple_of(count) {
             return None;
         }
-        let fields = Fields { form, text, from, ends, rows: ends.len() / count, count };
-        for (row, ends) in ends.chunks_exact(count).enumerate() {
-            let (last, others) = ends.split_last()?;
-            if !is_last(last) || others.iter().any(is_last) {
-                return None;
-            }
+        let rows = (ends.len() - 1) / count;
+        let point = if form.decimal_comma { b',' } else { b'.' };
+        let fields = Fields { form, text, ends, rows, count, point };
+        if lines != rows || !ends[1..].chunks_exact(count).all(|row| row.last().is_some_and(is_last)) {
+            return None;
+        }
+        let comment = matches!(form.slots[0], Slot::Skip);
+        if !comment && count == columns && form.delimiter != Delimiter::Spaces {
+            return Some(fields);
+        }
+        for row in 0..rows {
             if count > columns && !fields.field(row, columns).trim_ascii().is_empty() {
                 return None;
             }
             // several blanks are one separator
-            let is_empty = |column: usize| fields.field(row, column).is_empty();
+            let is_empty = |column: usize| fields.field(row, column).trim_ascii().is_empty();
             if form.delimiter == Delimiter::Spaces && (0..count).any(is_empty) {
                 return None;
             }
             // no comment and nothing before the first field; what is no number is found there
-            if matches!(form.slots[0], Slot::Skip)
-                && matches!(fields.field(row, 0).first(), None | Some(b'#' | b'%' | b'/' | b' ' | b'\t'))
+            if comment
+                && matches!(fields.field(row, 0).first(), None | Some(b'#' | b'%' | b'/' | b' ' | b'\t' | b'\r' | 0x0c))
             {
                 return None;
             }
@@ -212,19 +226,15 @@ impl<'a> Fields<'a> {
         Some(fields)
     }
 
-    /// Begin and end of a field.
-    #[inline(always)]
-    fn place(&self, row: usize, column: usize) -> (usize, usize) {
+    fn field(&self, row: usize, column: usize) -> &[u8] {
         let i = row * self.count + column;
-        let from = if i == 0 { self.from } else { self.ends[i - 1] as usize + 1 };
-        let end = self.ends[i] as usize;
-        let line_end = column + 1 == self.count && end > from && self.text[end - 1] == b'\r';
-        (from, end - usize::from(line_end))
+        &self.text[self.ends[i] as usize + 1..self.ends[i + 1] as usize]
     }
 
-    fn field(&self, row: usize, column: usize) -> &[u8] {
-        let (from, end) = self.place(row, column);
-        &self.text[from..end]
+    /// Beginning and end of a field.
+    #[inline(always)]
+    fn place(&self, at: usize) -> (usize, usize) {
+        self.ends[at..].first_chunk::<2>().map_or((0, 0), |[before, end]| (*before as usize + 1, *end as usize))
     }
 
     /// All wanted columns; false if some field shows that the line is not alike.
@@ -235,10 +245,13 @@ impl<'a> Fields<'a> {
                 Slot::Skip => {}
                 Slot::Axis(axis) | Slot::Beside(axis) => {
                     let values = &mut rows.values[axis];
-                    values.reserve(self.rows);
-                    for row in 0..self.rows {
-                        let (from, end) = self.place(row, column);
-                        let value = match self.decimal(simd, from, end) {
+                    let whole = values.len();
+                    values.resize(whole + self.rows, 0.0);
+                    let mut at = column;
+                    for value in &mut values[whole..] {
+                        let (from, end) = self.place(at);
+                        at += self.count;
+                        *value = match self.decimal(simd, from, end) {
                             Some(Decimal { negative, whole, fraction, count }) => {
                                 let value = decimal(whole, fraction, count);
                                 f64::from_bits(value.to_bits() | u64::from(negative) << 63)
@@ -248,14 +261,16 @@ impl<'a> Fields<'a> {
                                 None => return false,
                             },
                         };
-                        values.push(value);
                     }
                 }
                 Slot::Time => {
                     let Some(origin) = self.form.origin else { return false };
-                    rows.time.reserve(self.rows);
-                    for row in 0..self.rows {
-                        let (from, end) = self.place(row, column);
+                    let whole = rows.time.len();
+                    rows.time.resize(whole + self.rows, 0.0);
+                    let mut at = column;
+                    for time in &mut rows.time[whole..] {
+                        let (from, end) = self.place(at);
+                        at += self.count;
                         let (whole, part) = match self.decimal(simd, from, end) {
                             Some(Decimal { negative, whole, fraction, count }) => {
                                 let (whole, part) = (whole as i64, fraction as i64 as f64 / ten(count));
@@ -266,7 +281,7 @@ impl<'a> Fields<'a> {
                                 None => return false,
                             },
                         };
-                        rows.time.push(since(origin, whole, part));
+                        *time = since(origin, whole, part);
                     }
                 }
             }
@@ -277,7 +292,7 @@ impl<'a> Fields<'a> {
     /// The field, if it is a sign or none, 1 to 8 digits, a decimal point, and 1 to 16 digits.
     #[inline(always)]
     fn decimal(&self, simd: impl Bytes, from: usize, end: usize) -> Option<Decimal> {
-        let near = self.text[..end].last_chunk::<32>()?;
+        let near: &[u8; 32] = self.text.get(end.wrapping_sub(32)..end)?.first_chunk()?;
         let length = end - from;
         if length.wrapping_sub(1) >= 32 {
             return None;
@@ -289,15 +304,14 @@ impl<'a> Fields<'a> {
         let at = point.trailing_zeros() as usize;
         let (whole, count) = (at.wrapping_sub(usize::from(negative)), length.wrapping_sub(at + 1));
         let one = (point != 0) & (point & point.wrapping_sub(1) == 0);
-        let fits = (whole.wrapping_sub(1) < 8) & (count.wrapping_sub(1) < 16) & (whole.wrapping_add(count) <= 19);
-        let sign = if self.form.decimal_comma { b',' } else { b'.' };
-        if !(one & fits & (near[31_usize.wrapping_sub(count) & 31] == sign)) {
+        if !(one & (count.wrapping_sub(1) < 16) & (near[31_usize.wrapping_sub(count) & 31] == self.point)) {
             return None;
         }
         let digits = near.last_chunk::<16>()?;
         let before = match whole {
             1 => u64::from(near[30_usize.wrapping_sub(count) & 31] & 15),
-            _ => eight(self.text, end - count - 1, whole),
+            2..=8 if whole + count <= 19 => eight(self.text, end - count - 1, whole),
+            _ => return None,
         };
         Some(Decimal { negative, whole: before, fraction: simd.sixteen(digits, count), count })
     }
@@ -308,7 +322,7 @@ impl<'a> Fields<'a> {
         let lead = field.iter().position(|b| *b != b' ' && *b != b'\t').unwrap_or(field.len());
         let field = field[lead..].trim_ascii_end();
         // between blanks there are no empty fields; an empty line and a comment are no rows
-        let first = from == self.from || self.text[from - 1] == b'\n';
+        let first = from == self.ends[0] as usize + 1 || self.text[from - 1] == b'\n';
         let none = match field.first() {
             None => first || self.form.delimiter == Delimiter::Spaces,
             Some(b'#' | b'%' | b'/') => first,

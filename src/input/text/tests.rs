@@ -348,19 +348,16 @@ fn many_bytes_at_once() {
             _ => b'0' + dice.up_to(9) as u8,
         });
         let bits = |is: &dyn Fn(u8) -> bool| block.iter().rev().fold(0, |all, b| all << 1 | u64::from(is(*b)));
-        let ends = |a: u8, b: u8| (bits(&|x| x == a || x == b || x == b'\n'), bits(&|x| x == b'"'));
+        let (feeds, quotes) = (bits(&|x| x == b'\n'), bits(&|x| x == b'"'));
+        let ends = |a: u8, b: u8| (bits(&|x| x == a || x == b) | feeds, feeds, quotes);
         let others = bits(&|x| !x.is_ascii_digit()) as u32;
         let start = block.first_chunk::<32>().unwrap();
         let digits = dice.digits(16);
         let text = <[u8; 16]>::try_from(digits.as_bytes()).unwrap();
         let numbers: Vec<u64> = (1..=16).map(|count| digits[16 - count..].parse().unwrap()).collect();
         let expected = (ends(b' ', b'\t'), ends(b';', b';'), others, numbers);
-        fn all(
-            simd: impl Bytes,
-            block: &[u8; 64],
-            start: &[u8; 32],
-            text: &[u8; 16],
-        ) -> ((u64, u64), (u64, u64), u32, Vec<u64>) {
+        type Found = ((u64, u64, u64), (u64, u64, u64), u32, Vec<u64>);
+        fn all(simd: impl Bytes, block: &[u8; 64], start: &[u8; 32], text: &[u8; 16]) -> Found {
             let numbers = (1..=16).map(|count| simd.sixteen(text, count)).collect();
             (simd.ends(block, [b' ', b'\t']), simd.ends(block, [b';', b';']), simd.others(start), numbers)
         }

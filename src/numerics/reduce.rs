@@ -77,10 +77,25 @@ pub fn by_eight(x: &[f64], term: impl Fn(f64) -> f64) -> f64 {
 }
 
 /// Compensated mean of a slice; NaN if it is empty.
+///
+/// Eight sums side by side, each addition with its rounding (Knuth 1998, section 4.2.2), so that no sample waits for the one before.
 pub fn mean(x: &[f64]) -> f64 {
-    let mut sum = Sum::default();
-    for &x in x {
-        sum.add(x);
+    const SIDE_BY_SIDE: usize = 8;
+    let (mut sums, mut lost) = ([0.0; SIDE_BY_SIDE], [0.0; SIDE_BY_SIDE]);
+    let (eights, rest) = x.as_chunks::<SIDE_BY_SIDE>();
+    for eight in eights {
+        for i in 0..SIDE_BY_SIDE {
+            let total = sums[i] + eight[i];
+            let part = total - sums[i];
+            lost[i] += (sums[i] - (total - part)) + (eight[i] - part);
+            sums[i] = total;
+        }
     }
-    sum.value() / x.len() as f64
+    let mut all = Sum::default();
+    sums.iter().chain(rest).for_each(|sum| all.add(*sum));
+    // an infinite sum has lost what is not a number
+    if all.sum.is_finite() {
+        lost.iter().for_each(|part| all.add(*part));
+    }
+    all.value() / x.len() as f64
 }

@@ -15,7 +15,7 @@ use realfft::num_complex::Complex;
 
 use super::fourier::{Roots, Spectrum};
 
-/// Rows of a spectrum taken at once.
+/// Columns of a spectrum taken at once.
 const BLOCK: usize = 8;
 
 /// The coefficients c_1 … c_{n−1}; empty for fewer than two samples. Same unit as `x`.
@@ -37,41 +37,52 @@ fn of_even(n: usize, entering: impl Fn(usize) -> f64 + Sync) -> Option<Vec<f64>>
     let m = n / 2;
     let spectrum = Spectrum::new(m, |k| Complex::new(entering(2 * k), entering(2 * k + 1)))?;
     let roots = Roots::new(4 * n);
+    let (a, b) = spectrum.shape();
+    let fine: Vec<[Complex<f64>; 2]> = (0..a).map(|r| [roots.at(r), roots.at(4 * r)]).collect();
     let scale = (2.0 / n as f64).sqrt();
-    let mut out = vec![0.0; n - 1];
-    let (low, rest) = out.split_at_mut(m - 1);
-    let (middle, high) = rest.split_first_mut()?;
-    *middle = scale * FRAC_1_SQRT_2 * (spectrum.first().re - spectrum.first().im);
-    let block = BLOCK * spectrum.rows();
-    // numbers k from 1 up, n − k from the end down
-    low.par_chunks_mut(block).zip(high.par_rchunks_mut(block)).enumerate().for_each(|(i, (low, high))| {
-        let first = i * block + 1;
-        let turns = roots.walk(first, 1).zip(roots.walk(4 * first, 4));
-        let places = low.iter_mut().zip(high.iter_mut().rev());
-        for ((low, high), ((here, mirror), (quarter, whole))) in places.zip(spectrum.pairs(first).zip(turns)) {
+    // c_k of k below m, c_m, c_{n−k}
+    let mut out = vec![0.0; n + 1];
+    let (low, high) = out.split_at_mut(m);
+    let (middle, high) = high.split_first_mut()?;
+    let places = low.par_chunks_mut(a * BLOCK).zip(high.par_rchunks_mut(a * BLOCK)).enumerate();
+    places.for_each(|(i, (low, high))| {
+        let columns = i * BLOCK..(i * BLOCK + BLOCK).min(b);
+        let turns = |c: usize| [roots.at(a * c), roots.at(4 * a * c)];
+        let coarse: Vec<[Complex<f64>; 2]> = columns.clone().map(turns).collect();
+        let first = columns.start;
+        spectrum.pairs(columns, |c, r, here, mirror| {
+            let ([quarter, whole], [near, far]) = (coarse[c - first], fine[r]);
             let (even, odd) = (here + mirror.conj(), here - mirror.conj());
-            let v = (even + whole * Complex::new(odd.im, -odd.re)) * quarter * 0.5;
-            (*low, *high) = (scale * v.re, -scale * v.im);
-        }
+            let v = (even + whole * far * Complex::new(odd.im, -odd.re)) * (quarter * near) * 0.5;
+            let place = (c - first) * a + r;
+            low[place] = scale * v.re;
+            high[high.len() - 1 - place] = -scale * v.im;
+        });
     });
+    let first = spectrum.first();
+    *middle = scale * FRAC_1_SQRT_2 * (first.re - first.im);
+    out.truncate(n);
+    out.remove(0);
     Some(out)
 }
 
+/// V_{n−k} is the conjugate of V_k.
 fn of_odd(n: usize, entering: impl Fn(usize) -> f64 + Sync) -> Option<Vec<f64>> {
     let spectrum = Spectrum::new(n, |k| Complex::new(entering(k), 0.0))?;
     let roots = Roots::new(4 * n);
+    let (a, b) = spectrum.shape();
+    let fine: Vec<Complex<f64>> = (0..a).map(|r| roots.at(r)).collect();
     let scale = (2.0 / n as f64).sqrt();
-    let mut out = vec![0.0; n - 1];
-    let (low, high) = out.split_at_mut((n - 1) / 2);
-    let block = BLOCK * spectrum.rows().max(BLOCK);
-    low.par_chunks_mut(block).zip(high.par_rchunks_mut(block)).enumerate().for_each(|(i, (low, high))| {
-        let first = i * block + 1;
-        let places = low.iter_mut().zip(high.iter_mut().rev());
-        for ((low, high), ((here, _), root)) in places.zip(spectrum.pairs(first).zip(roots.walk(first, 1))) {
-            let v = here * root;
-            (*low, *high) = (scale * v.re, -scale * v.im);
-        }
+    let mut out = vec![0.0; n];
+    out.par_chunks_mut(a * BLOCK).enumerate().for_each(|(i, out)| {
+        let columns = i * BLOCK..(i * BLOCK + BLOCK).min(b);
+        let coarse: Vec<Complex<f64>> = columns.clone().map(|c| roots.at(a * c)).collect();
+        let first = columns.start;
+        spectrum.pairs(columns, |c, r, here, _| {
+            out[(c - first) * a + r] = scale * (here * (coarse[c - first] * fine[r])).re;
+        });
     });
+    out.remove(0);
     Some(out)
 }
 

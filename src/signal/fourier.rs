@@ -6,6 +6,7 @@
 //! the threads. Sources: Cooley & Tukey 1965; Bailey 1990 (four steps); Bluestein 1970.
 
 use std::f64::consts::PI;
+use std::ops::Range;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -16,6 +17,8 @@ use rustfft::{Fft, FftDirection, FftPlanner};
 const TILE: usize = 8;
 /// The smaller factor at least.
 const SHORTEST: usize = 64;
+/// Factors of so many neighbours are made of one.
+const RUN: usize = 32;
 /// Shorter transforms are not worth the trouble.
 pub(super) const FEWEST: usize = 8192;
 const ZERO: Complex<f64> = Complex::new(0.0, 0.0);
@@ -37,25 +40,24 @@ impl Roots {
     }
 
     /// `k` at most m.
-    fn at(&self, k: usize) -> Complex<f64> {
+    pub(super) fn at(&self, k: usize) -> Complex<f64> {
         self.fine[k % self.fine.len()] * self.coarse[k / self.fine.len()]
     }
 
-    /// Of `first`, `first + by`, … as far as m.
-    pub(crate) fn walk(&self, first: usize, by: usize) -> impl Iterator<Item = Complex<f64>> + '_ {
-        let step = self.fine.len();
-        let (mut high, mut low) = (first / step, first % step);
-        let (by_high, by_low) = (by / step, by % step);
-        std::iter::from_fn(move || {
-            let root = self.coarse.get(high)? * self.fine[low];
-            high += by_high;
-            low += by_low;
-            if low >= step {
-                low -= step;
-                high += 1;
-            }
-            Some(root)
-        })
+    /// Calls `visit(i, root)` for `count` roots, number `first` + `by` i each, up to m.
+    pub(crate) fn walk(&self, first: usize, by: usize, count: usize, mut visit: impl FnMut(usize, Complex<f64>)) {
+        let run = RUN.min(count);
+        let fine: [Complex<f64>; RUN] = std::array::from_fn(|i| if i < run { self.at(by * i) } else { ZERO });
+        for start in (0..count).step_by(RUN) {
+            let coarse = self.at(first + by * start);
+            let last = RUN.min(count - start);
+            fine[..last].iter().enumerate().for_each(|(i, fine)| visit(start + i, coarse * fine));
+        }
+    }
+
+    /// v_k ← v_k e^{−2πi by k/m}, or by its conjugate.
+    fn turn(&self, values: &mut [Complex<f64>], by: usize, back: bool) {
+        self.walk(0, by, values.len(), |k, root| values[k] *= if back { root.conj() } else { root });
     }
 }
 
@@ -74,33 +76,29 @@ impl Spectrum {
             return None;
         }
         match FourSteps::new(m) {
-            Some(steps) => Some(Spectrum { values: steps.forward(x), a: steps.a, b: steps.b }),
+            Some(steps) => Some(Spectrum { values: steps.forward(x, &mut Vec::new()), a: steps.a, b: steps.b }),
             None => Some(Spectrum { values: chirp(m, x)?, a: 1, b: m }),
         }
     }
 
-    /// Numbers to the next multiple of which neighbours are taken best.
-    pub(super) fn rows(&self) -> usize {
-        self.a
-    }
-
-    /// X_k and X_{m−k} for k from `first`, at least 1.
-    pub(super) fn pairs(&self, first: usize) -> impl Iterator<Item = (Complex<f64>, Complex<f64>)> + '_ {
+    /// Calls `visit(k, X_k, X_{m−k})` for k = a c + r, c in `columns`, r below a; X_m is X_0. Rows are read along.
+    pub(super) fn pairs(&self, columns: Range<usize>, mut visit: impl FnMut(usize, usize, Complex<f64>, Complex<f64>)) {
         let (a, b) = (self.a, self.b);
-        let (mut row, mut column) = (first % a, first / a);
-        std::iter::from_fn(move || {
-            let here = *self.values.get(row * b + column)?;
-            let mirror = if row == 0 { b - column } else { (a - row) * b + (b - 1 - column) };
-            row += 1;
-            if row == a {
-                (row, column) = (0, column + 1);
+        for r in 0..a {
+            let (row, mirror) = (&self.values[r * b..][..b], &self.values[(a - r) % a * b..][..b]);
+            for c in columns.clone() {
+                visit(c, r, row[c], mirror[if r == 0 { (b - c) % b } else { b - 1 - c }]);
             }
-            Some((here, *self.values.get(mirror)?))
-        })
+        }
     }
 
     pub(super) fn first(&self) -> Complex<f64> {
         self.values[0]
+    }
+
+    /// a and b: k = r + a c with r below a and c below b.
+    pub(super) fn shape(&self) -> (usize, usize) {
+        (self.a, self.b)
     }
 }
 
@@ -123,11 +121,11 @@ impl FourSteps {
         [self.a, self.b].map(|length| planner.plan_fft(length, direction))
     }
 
-    /// Rows of equal k₁.
-    fn forward(&self, x: impl Fn(usize) -> Complex<f64> + Sync) -> Vec<Complex<f64>> {
+    /// Rows of equal k₁; `tiles` is memory that is used on the way.
+    fn forward(&self, x: impl Fn(usize) -> Complex<f64> + Sync, tiles: &mut Vec<Complex<f64>>) -> Vec<Complex<f64>> {
         let (a, b) = (self.a, self.b);
         let [of_columns, of_rows] = self.plans(FftDirection::Forward);
-        let mut tiles = vec![ZERO; a * b];
+        tiles.resize(a * b, ZERO);
         let memory = || (vec![ZERO; a * TILE], vec![ZERO; of_columns.get_inplace_scratch_len()]);
         tiles.par_chunks_mut(a * TILE).enumerate().for_each_init(memory, |(columns, scratch), (tile, out)| {
             let (width, first) = (out.len() / a, tile * TILE);
@@ -135,32 +133,32 @@ impl FourSteps {
                 (0..width).for_each(|t| columns[t * a + j] = x(b * j + first + t));
             }
             of_columns.process_with_scratch(&mut columns[..a * width], scratch);
-            for (t, column) in columns.chunks_exact(a).take(width).enumerate() {
-                let turned = column.iter().zip(self.roots.walk(0, first + t));
-                out[t..].iter_mut().step_by(width).zip(turned).for_each(|(out, (v, root))| *out = v * root);
+            for (t, column) in columns.chunks_exact_mut(a).take(width).enumerate() {
+                self.roots.turn(column, first + t, false);
+                out[t..].iter_mut().step_by(width).zip(column).for_each(|(out, v)| *out = *v);
             }
         });
         let mut rows = vec![ZERO; a * b];
         let memory = || vec![ZERO; of_rows.get_inplace_scratch_len()];
         rows.par_chunks_mut(b).enumerate().for_each_init(memory, |scratch, (k, row)| {
             for (tile, part) in tiles.chunks(a * TILE).zip(row.chunks_mut(TILE)) {
-                part.copy_from_slice(&tile[k * part.len()..][..part.len()]);
+                let from = &tile[k * part.len()..];
+                part.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
             }
             of_rows.process_with_scratch(row, scratch);
         });
         rows
     }
 
-    /// Σ_k X_k e^{2πijk/m} of rows of equal k₁; x_j is number a j₂ + j₁.
-    fn back(&self, rows: &mut [Complex<f64>]) -> Vec<Complex<f64>> {
+    /// Σ_k X_k e^{2πijk/m} of rows of equal k₁, into as many `columns`; x_j is number a j₂ + j₁.
+    fn back(&self, rows: &mut [Complex<f64>], columns: &mut [Complex<f64>]) {
         let (a, b) = (self.a, self.b);
         let [of_columns, of_rows] = self.plans(FftDirection::Inverse);
         let memory = || vec![ZERO; of_rows.get_inplace_scratch_len()];
         rows.par_chunks_mut(b).enumerate().for_each_init(memory, |scratch, (k, row)| {
             of_rows.process_with_scratch(row, scratch);
-            row.iter_mut().zip(self.roots.walk(0, k)).for_each(|(v, root)| *v *= root.conj());
+            self.roots.turn(row, k, true);
         });
-        let mut columns = vec![ZERO; a * b];
         let memory = || vec![ZERO; of_columns.get_inplace_scratch_len()];
         columns.par_chunks_mut(a * TILE).enumerate().for_each_init(memory, |scratch, (tile, out)| {
             let width = out.len() / a;
@@ -170,7 +168,6 @@ impl FourSteps {
             }
             of_columns.process_with_scratch(out, scratch);
         });
-        columns
     }
 }
 
@@ -179,14 +176,16 @@ fn chirp(m: usize, x: impl Fn(usize) -> Complex<f64> + Sync) -> Option<Vec<Compl
     let length = smooth(2 * m - 1);
     let steps = FourSteps::new(length)?;
     let roots = Roots::new(2 * m);
-    let w = |k: usize| roots.at((k as u128 * k as u128 % (2 * m as u128)) as usize);
-    let kernel = steps.forward(|j| match j.min(length - j) {
+    let w = |k: usize| roots.at((k as u64 * k as u64 % (2 * m as u64)) as usize);
+    let kernel = |j: usize| match j.min(length - j) {
         near if near < m => w(near).conj(),
         _ => ZERO,
-    });
-    let mut product = steps.forward(|j| if j < m { x(j) * w(j) } else { ZERO });
+    };
+    let mut found = Vec::new();
+    let kernel = steps.forward(kernel, &mut found);
+    let mut product = steps.forward(|j| if j < m { x(j) * w(j) } else { ZERO }, &mut found);
     product.par_iter_mut().zip(&kernel).for_each(|(p, k)| *p *= k);
-    let found = steps.back(&mut product);
+    steps.back(&mut product, &mut found);
     let of = |k: usize| found[k % steps.b * steps.a + k / steps.b] * w(k) / length as f64;
     Some((0..m).into_par_iter().map(of).collect())
 }
@@ -214,13 +213,15 @@ mod tests {
             let mut whole: Vec<Complex<f64>> = (0..m).map(number).collect();
             FftPlanner::new().plan_fft_forward(m).process(&mut whole);
             let found = Spectrum::new(m, number).expect("long enough");
-            assert!((found.first() - whole[0]).norm() < 1e-10);
-            for (k, (here, mirror)) in (1..m).zip(found.pairs(1)) {
+            let (a, b) = found.shape();
+            let mut seen = 0;
+            found.pairs(0..b, |c, r, here, mirror| {
+                let k = a * c + r;
                 assert!((here - whole[k]).norm() < 1e-10, "{m}, {k}: {here} for {}", whole[k]);
-                assert!((mirror - whole[m - k]).norm() < 1e-10, "{m}, {k}: {mirror}");
-            }
-            let (_, last) = found.pairs(1).nth(m - 2).expect("m − 1 pairs");
-            assert!((last - whole[1]).norm() < 1e-10);
+                assert!((mirror - whole[(m - k) % m]).norm() < 1e-10, "{m}, {k}: {mirror}");
+                seen += 1;
+            });
+            assert_eq!(seen, m);
         }
     }
 
@@ -242,14 +243,18 @@ mod tests {
         assert_eq!(smooth(333_333), 337_500);
     }
 
-    /// Two tables against sine and cosine of each: angles below 2π are rounded to 4e-16, on both sides.
+    /// Tables against sine and cosine of each: angles below 2π are rounded to 4e-16, on both sides, and once more in a walk.
     #[test]
     fn roots_lie_on_the_circle() {
         let m = 1003;
-        for (k, root) in Roots::new(m).walk(0, 1).take(m).enumerate() {
-            let (sin, cos) = (2.0 * PI * k as f64 / m as f64).sin_cos();
-            assert!((root - Complex::new(cos, -sin)).norm() < 2e-15, "{k}: {root}");
-        }
-        assert!((Roots::new(m).walk(5, 37).nth(20).expect("745") - Roots::new(m).at(745)).norm() < 1e-16);
+        let expected = |k: usize| Complex::new(0.0, -2.0 * PI * k as f64 / m as f64).exp();
+        let roots = Roots::new(m);
+        (0..=m).for_each(|k| assert!((roots.at(k) - expected(k)).norm() < 2e-15, "{k}"));
+        let mut seen = 0;
+        roots.walk(5, 12, 83, |i, root| {
+            assert!((root - expected(5 + 12 * i)).norm() < 3e-15, "{i}: {root}");
+            seen += 1;
+        });
+        assert_eq!(seen, 83);
     }
 }

@@ -54,19 +54,16 @@ pub fn find_lines(power: &[f64], step: f64) -> Vec<Line> {
     }
     let of_size = |size: usize| {
         let tried = (power.len() / size).max(1) as f64 * 16.0;
-        let mut peaks: Vec<(f64, usize, usize)> = Vec::new();
-        let mut at = FIRST.max(size * 8);
-        while at + size <= power.len() {
+        let count = size as f64;
+        let enough = count + 4.0 * (2.0 * count).sqrt();
+        let stands_out = |at: usize| {
             let sum = sums[at + size] - sums[at];
             // far beyond the threshold the tail underflows; the excess then ranks
-            if sum > size as f64 + 4.0 * (2.0 * size as f64).sqrt()
-                && chi_square_sf(sum, size as f64) < FALSE_LINE / tried
-            {
-                peaks.push(((sum - size as f64) / (2.0 * size as f64).sqrt(), at, size));
-            }
-            at += size.div_ceil(2);
-        }
-        peaks
+            let line = sum > enough && chi_square_sf(sum, count) < FALSE_LINE / tried;
+            line.then(|| ((sum - count) / (2.0 * count).sqrt(), at, size))
+        };
+        let places = (FIRST.max(size * 8)..(power.len() + 1).saturating_sub(size)).step_by(size.div_ceil(2));
+        places.filter_map(stands_out).collect::<Vec<(f64, usize, usize)>>()
     };
     let largest = (power.len() - FIRST.min(power.len())) / 8;
     let sizes = std::iter::successors(Some(1), |size| Some(2 * size)).take_while(|size| *size <= largest);

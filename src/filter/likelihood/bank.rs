@@ -30,6 +30,7 @@ pub(super) struct Bank {
     q: Vec<Lane>,
     h: Vec<Lane>,
     r: Lane,
+    inverse_r: Lane,
     /// P(k|k−1), by rows.
     p: Vec<Lane>,
     /// x(k|k−1) of every column, one after the other.
@@ -94,6 +95,7 @@ impl Bank {
             q: matrix(&|m| &m.q),
             h: (0..n).map(|i| lane(&|m| m.h[(0, i)])).collect(),
             r: lane(&|m| m.r[(0, 0)]),
+            inverse_r: lane(&|m| 1.0 / m.r[(0, 0)]),
             p: matrix(&|m| &m.p0),
             x,
             settled: None,
@@ -139,14 +141,15 @@ impl Bank {
         Arch::new().dispatch(Pass { bank: self, samples });
     }
 
+    /// `n`: of states, known to the compiler where they are few.
     #[inline(always)]
-    fn pass(&mut self, samples: Samples<'_>) {
+    fn pass(&mut self, n: usize, samples: Samples<'_>) {
         let length = samples.log.len();
         let mut at = 0;
         while at < length {
             if !samples.log[at].is_finite() {
                 (self.settled, self.steady) = (None, None);
-                self.predict();
+                self.predict(n);
                 at += 1;
                 continue;
             }
@@ -160,10 +163,10 @@ impl Bank {
             if look {
                 self.scratch.before.copy_from_slice(&self.p);
             }
-            self.update([samples.log[at], 1.0, samples.ramp.get(at).copied().unwrap_or(0.0)]);
-            self.predict();
+            self.update(n, [samples.log[at], 1.0, samples.ramp.get(at).copied().unwrap_or(0.0)]);
+            self.predict(n);
             // P0 may be zero
-            if look && self.count > 1 && self.is_still() {
+            if look && self.count > 1 && self.is_still(n) {
                 self.settled = Some(Settled::new(&self.f, &self.h, &self.p, self.r));
             }
             at += 1;
@@ -173,9 +176,10 @@ impl Bank {
 
     /// K = P hᵀ/S, P ← (I − K h) P (I − K h)ᵀ + K r Kᵀ, x ← x + K ν.
     #[inline(always)]
-    fn update(&mut self, z: [f64; COLUMNS]) {
-        let (n, h, p) = (self.n, &self.h[..], &mut self.p[..]);
+    fn update(&mut self, n: usize, z: [f64; COLUMNS]) {
+        let (h, p) = (&self.h[..n], &mut self.p[..n * n]);
         let Scratch { v, w, gain, .. } = &mut self.scratch;
+        let (v, w, gain) = (&mut v[..n], &mut w[..n], &mut gain[..n]);
         let mut variance = self.r;
         for i in 0..n {
             v[i] = dot(&p[i * n..][..n], h);
@@ -210,7 +214,7 @@ impl Bank {
                 *sum += weighted * other;
             }
         }
-        self.product *= variance / self.r;
+        self.product *= variance * self.inverse_r;
         if !self.product.all_at_most(Lane::all(LARGE)) {
             self.take_logarithm();
         }
@@ -219,16 +223,16 @@ impl Bank {
 
     /// x ← F x, P ← F P Fᵀ + Q.
     #[inline(always)]
-    fn predict(&mut self) {
-        let n = self.n;
+    fn predict(&mut self, n: usize) {
         let Scratch { v, matrix, .. } = &mut self.scratch;
         if let Some(f) = &self.f.diagonal {
+            let (f, p, q) = (&f[..n], &mut self.p[..n * n], &self.q[..n * n]);
             for i in 0..n {
                 self.x.chunks_exact_mut(n).for_each(|x| x[i] *= f[i]);
                 for j in 0..=i {
-                    let value = self.p[i * n + j] * f[i] * f[j] + self.q[i * n + j];
-                    self.p[i * n + j] = value;
-                    self.p[j * n + i] = value;
+                    let value = p[i * n + j] * f[i] * f[j] + q[i * n + j];
+                    p[i * n + j] = value;
+                    p[j * n + i] = value;
                 }
             }
             return;
@@ -254,8 +258,8 @@ impl Bank {
 
     /// The covariance is that of the step before, in every lane.
     #[inline(always)]
-    fn is_still(&self) -> bool {
-        let (n, p, before) = (self.n, &self.p, &self.scratch.before);
+    fn is_still(&self, n: usize) -> bool {
+        let (p, before) = (&self.p[..n * n], &self.scratch.before[..n * n]);
         let entry = |(i, j): (usize, usize)| {
             let moved = p[i * n + j] - before[i * n + j];
             let scale = Lane::all(ROUNDINGS * ROUNDINGS) * p[i * n + i] * p[j * n + j];
@@ -333,6 +337,11 @@ impl WithSimd for Pass<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        self.bank.pass(self.samples);
+        match self.bank.n {
+            1 => self.bank.pass(1, self.samples),
+            2 => self.bank.pass(2, self.samples),
+            3 => self.bank.pass(3, self.samples),
+            n => self.bank.pass(n, self.samples),
+        }
     }
 }

@@ -66,19 +66,14 @@ pub(super) fn identify(
 ) -> Result<Identified, IdentifyError> {
     usable(name, rate)?;
     let failed = |message: String| IdentifyError { message: format!("{name}: {message}") };
-    let (curve, (data, fits, held_out)) = rayon::join(
+    let (curve, found) = rayon::join(
         || allan::curve(rate, dt, Deviation::Oadev, TauGrid::Log(POINTS_PER_DECADE)),
-        || {
-            let data = Ordinates::new(rate, dt, None);
-            let (fits, thirds) = rayon::join(|| fits(&data, choice), || thirds(rate, &data));
-            let held_out = held_out(&thirds, &fits);
-            (data, fits, held_out)
-        },
+        || search(rate, logs, dt, choice),
     );
     let mut curve = curve.map_err(|e| failed(e.to_string()))?;
     let forced = *choice != ModelChoice::Auto;
-    let chosen = if forced { 0 } else { choice_of(&data, &fits, &held_out) };
-    let Some((on_cosines, known)) = fits.get(chosen) else {
+    let Candidates { data, fits, held_out, chosen, refined } = found;
+    let (Some((on_cosines, _)), Some((fitted, refined))) = (fits.get(chosen), refined) else {
         let line = matches!(choice, ModelChoice::Terms(kinds) if kinds.contains(&Kind::Oscillation));
         return Err(failed(if line {
             "no line stands out of the spectrum: leave osc out of --model".into()
@@ -87,7 +82,6 @@ pub(super) fn identify(
         }));
     };
 
-    let (fitted, refined) = refine(&data, on_cosines, known, on_cosines, logs);
     let Fitted { fit, known } = &fitted;
     let words = Words { data: &data, display };
     let terms = known_terms(&data, fit, known);
@@ -144,6 +138,39 @@ pub(super) fn identify(
         first_tau_s: None,
         curve,
     })
+}
+
+/// Candidates and the one that was chosen.
+struct Candidates {
+    data: Ordinates,
+    /// Best score first.
+    fits: Vec<(Fit, Vec<Precision>)>,
+    held_out: Vec<Option<f64>>,
+    chosen: usize,
+    /// The chosen one at the maximum of the exact likelihood; `None` when there are no candidates.
+    refined: Option<(Fitted, Option<Refined>)>,
+}
+
+fn search(rate: &[f64], logs: &[Vec<Stretch<'_>>], dt: f64, choice: &ModelChoice) -> Candidates {
+    let data = Ordinates::new(rate, dt, None);
+    let refined = |fits: &[(Fit, Vec<Precision>)], chosen: usize| {
+        fits.get(chosen).map(|(fit, known)| refine(&data, fit, known, fit, logs))
+    };
+    match choice {
+        ModelChoice::Auto => {
+            let (fits, thirds) = rayon::join(|| fits(&data, choice), || thirds(rate, &data));
+            let held_out = held_out(&thirds, &fits);
+            let chosen = choice_of(&data, &fits, &held_out);
+            let refined = refined(&fits, chosen);
+            Candidates { data, fits, held_out, chosen, refined }
+        }
+        // what is held out chooses nothing
+        ModelChoice::Terms(_) => {
+            let fits = fits(&data, choice);
+            let (refined, held_out) = rayon::join(|| refined(&fits, 0), || held_out(&thirds(rate, &data), &fits));
+            Candidates { data, fits, held_out, chosen: 0, refined }
+        }
+    }
 }
 
 /// Fits of the models that come into question, best score first, with what is known of their parameters.

@@ -66,11 +66,12 @@ impl Ordinates {
             let own = &coefficients[first..first + size];
             let (mut with_ramp, mut ramp) = (0.0, 0.0);
             // the numbers first + 1, …; even ones have none of a ramp
-            for (c, angle) in own.iter().skip(first % 2).step_by(2).zip(angles.walk(first + 1 + first % 2, 2)) {
+            let skipped = first % 2;
+            angles.walk(first + 1 + skipped, 2, (size - skipped).div_ceil(2), |i, angle| {
                 let r = scale * angle.re / (2.0 * angle.im * angle.im);
-                with_ramp += c * r;
+                with_ramp += own[skipped + 2 * i] * r;
                 ramp += r * r;
-            }
+            });
             let power = own.iter().map(|c| c * c).sum();
             Bin { frequency_hz: middle(first, size) * step, count: size as f64, power, with_ramp, ramp }
         };

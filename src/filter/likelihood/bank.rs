@@ -1,5 +1,7 @@
 //! Several filters of one shape side by side over one log: covariances until they have settled, then constant gains.
 
+#![allow(clippy::needless_range_loop, reason = "indices as in the equations")]
+
 use nalgebra::DMatrix;
 use pulp::{Arch, Simd, WithSimd};
 
@@ -159,19 +161,102 @@ impl Bank {
                 at = end;
                 continue;
             }
-            let look = self.count.is_multiple_of(LOOK as u64);
-            if look {
-                self.scratch.before.copy_from_slice(&self.p);
-            }
-            self.update(n, [samples.log[at], 1.0, samples.ramp.get(at).copied().unwrap_or(0.0)]);
-            self.predict(n);
+            let usable = samples.log[at..length.min(at + LOOK)].iter().take_while(|z| z.is_finite()).count();
+            self.moving_gain(n, samples.part(at, at + usable));
+            at += usable;
             // P0 may be zero
-            if look && self.count > 1 && self.is_still(n) {
+            if self.count > 1 && self.is_still(n) {
                 self.settled = Some(Settled::new(&self.f, &self.h, &self.p, self.r));
             }
-            at += 1;
         }
         self.take_logarithm();
+    }
+
+    /// Finite samples, each with its own gain.
+    #[inline(always)]
+    fn moving_gain(&mut self, n: usize, samples: Samples<'_>) {
+        match (n, self.f.diagonal.is_some(), self.columns) {
+            (1, true, 2) => self.few_modes::<1, 2>(samples),
+            (1, true, _) => self.few_modes::<1, 3>(samples),
+            (2, true, 2) => self.few_modes::<2, 2>(samples),
+            (2, true, _) => self.few_modes::<2, 3>(samples),
+            _ => {
+                for k in 0..samples.log.len() {
+                    if k + 1 == samples.log.len() {
+                        self.scratch.before.copy_from_slice(&self.p);
+                    }
+                    self.update(n, [samples.log[k], 1.0, samples.ramp.get(k).copied().unwrap_or(0.0)]);
+                    self.predict(n);
+                }
+            }
+        }
+    }
+
+    /// [`Bank::update`] and [`Bank::predict`] in registers, for a diagonal F of few states.
+    #[inline(always)]
+    fn few_modes<const N: usize, const C: usize>(&mut self, samples: Samples<'_>) {
+        let Some(diagonal) = &self.f.diagonal else { return };
+        let (mut f, mut h, mut x) = ([Lane::ZERO; N], [Lane::ZERO; N], [[Lane::ZERO; N]; C]);
+        let (mut p, mut q, mut before) = ([[Lane::ZERO; N]; N], [[Lane::ZERO; N]; N], [[Lane::ZERO; N]; N]);
+        f.copy_from_slice(diagonal);
+        h.copy_from_slice(&self.h);
+        p.iter_mut().zip(self.p.chunks_exact(N)).for_each(|(to, from)| to.copy_from_slice(from));
+        q.iter_mut().zip(self.q.chunks_exact(N)).for_each(|(to, from)| to.copy_from_slice(from));
+        x.iter_mut().zip(self.x.chunks_exact(N)).for_each(|(to, from)| to.copy_from_slice(from));
+        let (r, inverse_r, mut sums, mut product) = (self.r, self.inverse_r, [[Lane::ZERO; C]; C], self.product);
+        for k in 0..samples.log.len() {
+            before = p;
+            let (mut v, mut variance) = ([Lane::ZERO; N], r);
+            for i in 0..N {
+                (0..N).for_each(|j| v[i] += p[i][j] * h[j]);
+                variance += h[i] * v[i];
+            }
+            let inverse = Lane::all(1.0) / variance;
+            let (mut gain, mut w) = ([Lane::ZERO; N], [Lane::ZERO; N]);
+            for i in 0..N {
+                gain[i] = v[i] * inverse;
+                w[i] = r * gain[i];
+                for j in 0..N {
+                    p[i][j] = p[i][j] - gain[i] * v[j];
+                    w[i] = w[i] - p[i][j] * h[j];
+                }
+            }
+            for i in 0..N {
+                for j in 0..=i {
+                    let value = (p[i][j] + w[i] * gain[j]) * f[i] * f[j] + q[i][j];
+                    (p[i][j], p[j][i]) = (value, value);
+                }
+            }
+            let z = settled::entering::<C>(samples, k);
+            let mut innovations = [Lane::ZERO; C];
+            for c in 0..C {
+                let mut predicted = h[0] * x[c][0];
+                (1..N).for_each(|i| predicted += h[i] * x[c][i]);
+                innovations[c] = z[c] - predicted;
+                (0..N).for_each(|i| x[c][i] = f[i] * (x[c][i] + gain[i] * innovations[c]));
+            }
+            for i in 0..C {
+                let weighted = innovations[i] * inverse;
+                (0..=i).for_each(|j| sums[i][j] += weighted * innovations[j]);
+            }
+            product *= variance * inverse_r;
+            if !product.all_at_most(Lane::all(LARGE)) {
+                self.product = product;
+                self.take_logarithm();
+                product = self.product;
+            }
+        }
+        self.product = product;
+        self.count += samples.log.len() as u64;
+        for i in 0..C {
+            (0..=i).for_each(|j| self.sums[i][j] += sums[i][j]);
+        }
+        let back = |to: &mut [Lane], from: &[[Lane; N]]| {
+            to.chunks_exact_mut(N).zip(from).for_each(|(to, from)| to.copy_from_slice(from));
+        };
+        back(&mut self.p, &p);
+        back(&mut self.scratch.before, &before);
+        back(&mut self.x, &x);
     }
 
     /// K = P hᵀ/S, P ← (I − K h) P (I − K h)ᵀ + K r Kᵀ, x ← x + K ν.

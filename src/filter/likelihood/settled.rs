@@ -80,7 +80,7 @@ pub(super) fn run(
 
 /// The columns as they enter at step `k`.
 #[inline(always)]
-fn entering<const C: usize>(samples: Samples<'_>, k: usize) -> [Lane; C] {
+pub(super) fn entering<const C: usize>(samples: Samples<'_>, k: usize) -> [Lane; C] {
     let mut z = [Lane::ZERO; C];
     for (c, z) in z.iter_mut().enumerate() {
         *z = Lane::all(match c {

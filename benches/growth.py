@@ -1,8 +1,8 @@
 """Time and memory against size, over four decades: whole commands of kfdesign on simulated logs.
 
-    python benches/growth.py [KFDESIGN] [--svg docs/figures/growth.svg] [--folder target/growth] [--most 7]
+    python benches/growth.py [KFDESIGN] [--svg docs/performance/growth.svg] [--folder target/growth] [--most 7]
 
-Prints a table and draws it. Nothing but Python is needed; --most is the largest power of ten of samples (or rows).
+Prints a table (the last column is the slope over the last decade) and draws it. Nothing but Python is needed; --most is the largest power of ten of samples (or rows).
 """
 import argparse, math, os, subprocess, time
 from pathlib import Path
@@ -83,8 +83,11 @@ def main():
             size = n // 100 if name == "montecarlo" else n
             rows[name].append((size, min(t for t, _ in times), max(m for _, m in times)))
     for name, points in rows.items():
-        print(f"| {name} | " + " | ".join(f"{t:.3g} s, {m:.0f} MB" for _, t, m in points) + " |")
+        (few, first, _), (many, last, _) = points[-2:]
+        slope = math.log(last / first) / math.log(many / few)
+        print(f"| {name} | " + " | ".join(f"{t:.3g} s, {m:.0f} MB" for _, t, m in points) + f" | {slope:.2f} |", flush=True)
     if args.svg:
+        args.svg.parent.mkdir(parents=True, exist_ok=True)
         draw(rows, args.svg)
 
 

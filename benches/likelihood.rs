@@ -161,11 +161,28 @@ fn median(mut times: Vec<f64>) -> f64 {
     times[times.len() / 2]
 }
 
-/// The two alternate, so that both see the same machine.
+/// The maximum alone, from where `by_hand` starts.
+fn maximum(z: &[f64]) -> [f64; 3] {
+    let deviation = |x: &[f64]| (x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64).sqrt();
+    let steps: Vec<f64> = z.windows(2).take(100_000).map(|pair| pair[1] - pair[0]).collect();
+    let level = z.iter().sum::<f64>() / z.len() as f64;
+    let std_dev = deviation(&z.iter().map(|z| z - level).collect::<Vec<f64>>()) / 10.0;
+    let density = deviation(&steps) * (0.5 * DT).sqrt();
+    let start =
+        NoiseModel { terms: vec![Term::White { density }, Term::GaussMarkov { std_dev, correlation_time: 10.0 }] };
+    let log = [vec![Stretch { missing: 0, samples: z }]];
+    numbers(&kfdesign::identify::maximum(&start, &log, DT).expect("a maximum").0)
+}
+
+/// They alternate, so that all see the same machine. Hands back the seconds of the maximum alone.
 fn compare(name: &str, z: &[f64]) -> f64 {
-    let (mut ours, mut auto, mut hand) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut ours, mut auto, mut hand, mut alone) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let mut last = None;
+    let mut only = [f64::NAN; 3];
     for _ in 0..5 {
+        let (time, found) = seconds(|| maximum(z));
+        alone.push(time);
+        only = found;
         let (time, found) = seconds(|| identify(z, &white_and_drift()));
         ours.push(time);
         auto.push(seconds(|| identify(z, &ModelChoice::Auto)).0);
@@ -173,13 +190,15 @@ fn compare(name: &str, z: &[f64]) -> f64 {
         hand.push(time);
         last = Some((found, reference));
     }
-    let (ours, auto, hand) = (median(ours), median(auto), median(hand));
+    let (ours, auto) = (median(ours), median(auto));
+    let [hand, alone] = [hand, alone].map(|times| times.into_iter().fold(f64::INFINITY, f64::min));
     if let Some((found, (at, value, calls))) = last {
         println!("{name}: N, sigma, Tc {:?}, diffuse ln L {:?}", numbers(&found.model), found.exact_log_likelihood);
         println!("  by hand {:?}, ln L of the log less its mean {} ({calls} likelihoods)", at.map(f64::exp), -value);
     }
-    println!("  white+gm {ours:.4} s, by hand {hand:.4} s, ratio {:.1}; auto {auto:.4} s", hand / ours);
-    ours
+    println!("  the maximum alone {only:?}: {alone:.4} s, by hand {hand:.4} s, ratio {:.1}", hand / alone);
+    println!("  identify white+gm {ours:.4} s, auto {auto:.4} s");
+    alone
 }
 
 /// One likelihood by hand, and eight of ours, in ms.

@@ -5,6 +5,7 @@ mod gmwm;
 mod likelihood;
 mod plan;
 mod temperature;
+mod windows;
 
 use std::time::Instant;
 

@@ -50,12 +50,6 @@ pub struct Args {
     reading: LogFlags,
 }
 
-impl Args {
-    fn window(&self) -> &str {
-        self.window.as_deref().unwrap_or_default()
-    }
-}
-
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum DeviationArg {
     /// Allan deviation, differences that do not overlap

@@ -3,6 +3,7 @@
 mod sight;
 pub(super) mod tables;
 mod temperature;
+mod windows;
 
 use std::path::{Path, PathBuf};
 
@@ -23,7 +24,7 @@ use crate::identify::{
     Candidate, Identified, Method, ModelChoice, Precision, SharedTime, TimeProfile, identify_axis, identify_logs,
     parse_model, shared_time,
 };
-use crate::input::{InputKind, TemperatureColumn};
+use crate::input::{InputKind, LogOptions, TemperatureColumn};
 use crate::params::{NotIdentified, Params, Source};
 use crate::replay::axes::RATE_TOLERANCE;
 use crate::signal::{LogCheck, Recording, upsets};
@@ -51,6 +52,10 @@ pub struct Args {
     /// also osc and ma)
     #[arg(long, value_name = "MODEL", default_value = "auto")]
     model: String,
+    /// Read the log in windows of this length and multiply their likelihoods, for logs too long for memory: 24h, 30min
+    /// [default: whole; files above 4 GiB in windows of 10 000 000 samples]
+    #[arg(long, value_name = "DURATION")]
+    window: Option<String>,
     /// Leave outliers out: samples farther from their surroundings than noise goes
     #[arg(long)]
     robust: bool,
@@ -172,9 +177,33 @@ struct CurveDocument {
 /// One axis as read and as identified.
 struct Axis {
     measured: AxisCurve,
-    part: Stretch,
+    /// On which the terms were chosen, and those of the log that are not among them.
+    samples: usize,
+    left_out: usize,
     found: Identified,
     warmth: Option<temperature::Shown>,
+}
+
+/// What is said of the log, or the logs, as a whole.
+struct Log {
+    name: String,
+    quantity: Quantity,
+    sample_rate_hz: f64,
+    /// Of one log.
+    sha256: Option<String>,
+    checks: Vec<LogCheck>,
+}
+
+impl Log {
+    fn warn_of_motion(&self, axis: &str, found: &mut Identified) {
+        let moves = |name: &Option<String>| name.as_deref().is_none_or(|name| name == axis);
+        if self.checks.iter().any(|check| check.findings.iter().any(|f| f.kind == "motion" && moves(&f.axis))) {
+            found.warnings.push(
+                "the log is not at rest all the time (see the log check): motion counts as drift here; cut it with --start/--end"
+                    .into(),
+            );
+        }
+    }
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
@@ -199,41 +228,20 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         Some(column) if args.method == MethodArg::Likelihood => TemperatureColumn::Named(column.into()),
         Some(column) => bail!("--temperature {column}: only --method likelihood has a regression on temperature"),
     };
-    let mut readings = Vec::with_capacity(args.logs.len());
-    for log in &args.logs {
-        let (recording, check) = crate::input::read(log, &options)?;
-        print_check(&recording.name, &check);
-        readings.push((recording, check));
-    }
-    let (recording, _) = &readings[0];
-    let dt = recording.dt();
-    let parts = by_axis(&args.logs, &readings, options.kind)?;
-    if parts.is_empty() {
-        bail!("{}: no axis to work on", args.logs[0].display());
-    }
-    let warmth = temperature::Warmth::new(&readings, options.kind);
-    let bar = progress(parts.len() as u64, "identify");
-    let axes: Vec<Axis> = parts
-        .into_par_iter()
-        .map(|part| {
-            let axis = identify(part, dt, args, &choice, &readings, warmth.as_ref());
-            bar.inc(1);
-            axis
-        })
-        .collect::<anyhow::Result<_>>()?;
-    bar.finish_and_clear();
-    let role = if args.method == MethodArg::Likelihood { "chooses the terms" } else { "is used" };
-    axes.iter().for_each(|axis| axis.part.print_left_out(role));
+    let (log, axes) = match windows::axes(args, &choice, &options)? {
+        Some(found) => found,
+        None => whole(args, &choice, &options)?,
+    };
     let params = Params {
-        quantity: recording.quantity,
-        sample_rate_hz: recording.sample_rate_hz,
+        quantity: log.quantity,
+        sample_rate_hz: log.sample_rate_hz,
         axes: axes.iter().map(|a| a.found.params.clone()).collect(),
         design: None,
         source: Some(Source {
             log: Some(args.logs.iter().map(|log| file_name(log)).collect::<Vec<_>>().join(", ")),
-            sha256: recording.sha256.clone().filter(|_| readings.len() == 1),
-            samples: Some(readings.iter().map(|(_, check)| check.samples).sum()),
-            span_s: Some(readings.iter().map(|(_, check)| check.span_s).sum()),
+            sha256: log.sha256.clone(),
+            samples: Some(log.checks.iter().map(|check| check.samples).sum()),
+            span_s: Some(log.checks.iter().map(|check| check.span_s).sum()),
             method: Some(args.method.method().name().into()),
             version: Some(env!("CARGO_PKG_VERSION").into()),
             note: None,
@@ -243,7 +251,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         atomic::write(path, params.to_json().as_bytes())?;
     }
     if let Some(path) = &args.plot {
-        atomic::write(path, sight::sheet(&recording.name, &axes).as_bytes())?;
+        atomic::write(path, sight::sheet(&log.name, &axes).as_bytes())?;
     }
     if let Some(path) = &args.report {
         atomic::write(path, sight::page(&params, &axes)?.as_bytes())?;
@@ -251,7 +259,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let profiles: Vec<&TimeProfile> = axes.iter().filter_map(|axis| axis.found.time_profile.as_ref()).collect();
     let shared = (profiles.len() == axes.len()).then(|| shared_time(&profiles)).flatten();
     if args.json {
-        let document = document(&params, &axes, &readings, args.method.method());
+        let document = document(&params, &axes, &log, args.method.method());
         print_json(&Document { shared_correlation_time: shared, ..document })?;
     } else {
         let mut text: Vec<String> = axes.iter().map(|axis| text(axis, params.quantity)).collect();
@@ -259,6 +267,48 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         print_text(&text.join("\n"))?;
     }
     Ok(Status::Done)
+}
+
+/// The logs in memory at once.
+fn whole(args: &Args, choice: &ModelChoice, options: &LogOptions) -> anyhow::Result<(Log, Vec<Axis>)> {
+    let mut readings = Vec::with_capacity(args.logs.len());
+    for log in &args.logs {
+        let (recording, check) = crate::input::read(log, options)?;
+        print_check(&recording.name, &check);
+        readings.push((recording, check));
+    }
+    let (recording, _) = &readings[0];
+    let log = Log {
+        name: recording.name.clone(),
+        quantity: recording.quantity,
+        sample_rate_hz: recording.sample_rate_hz,
+        sha256: recording.sha256.clone().filter(|_| readings.len() == 1),
+        checks: readings.iter().map(|(_, check)| check.clone()).collect(),
+    };
+    let dt = recording.dt();
+    let parts = by_axis(&args.logs, &readings, options.kind)?;
+    if parts.is_empty() {
+        bail!("{}: no axis to work on", args.logs[0].display());
+    }
+    let warmth = temperature::Warmth::new(&readings, options.kind);
+    let bar = progress(parts.len() as u64, "identify");
+    let axes: Vec<(Axis, Option<String>)> = parts
+        .into_par_iter()
+        .map(|part| {
+            let axis = identify(part, dt, args, choice, &log, warmth.as_ref());
+            bar.inc(1);
+            axis
+        })
+        .collect::<anyhow::Result<_>>()?;
+    bar.finish_and_clear();
+    let mut all = Vec::with_capacity(axes.len());
+    for (axis, note) in axes {
+        if let Some(note) = note {
+            eprintln!("  note: {}: {note}", axis.measured.name);
+        }
+        all.push(axis);
+    }
+    Ok((log, all))
 }
 
 fn file_name(path: &Path) -> String {
@@ -296,15 +346,15 @@ fn by_axis(logs: &[PathBuf], readings: &[(Recording, LogCheck)], kind: InputKind
     Ok(all)
 }
 
-/// `parts`: the stretches of one axis, one per log.
+/// `parts`: the stretches of one axis, one per log. With what is to be said of what was left out.
 fn identify(
     mut parts: Vec<Stretch>,
     dt: f64,
     args: &Args,
     choice: &ModelChoice,
-    readings: &[(Recording, LogCheck)],
+    log: &Log,
     warmth: Option<&temperature::Warmth>,
-) -> anyhow::Result<Axis> {
+) -> anyhow::Result<(Axis, Option<String>)> {
     // the first of the longest
     let longest = (0..parts.len()).rev().max_by_key(|i| parts[*i].rate.len()).unwrap_or(0);
     let upsets = upset_words(&parts[longest], dt, args.robust);
@@ -322,17 +372,13 @@ fn identify(
         found.warnings.push(format!("{dropped} outliers were left out"));
     }
     found.warnings.extend(upsets);
-    let moves = |axis: &Option<String>| axis.as_ref().is_none_or(|name| *name == part.name);
-    if readings.iter().any(|(_, check)| check.findings.iter().any(|f| f.kind == "motion" && moves(&f.axis))) {
-        found.warnings.push(
-            "the log is not at rest all the time (see the log check): motion counts as drift here; cut it with --start/--end"
-                .into(),
-        );
-    }
+    log.warn_of_motion(&part.name, &mut found);
     let part = parts.swap_remove(longest);
     let (curve, fit) = (found.curve.clone(), Ok(found.model.clone()));
     let measured = AxisCurve { name: part.name.clone(), unit: part.unit.clone(), note: None, curve, fit };
-    Ok(Axis { measured, part, found, warmth })
+    let role = if method == Method::Likelihood { "chooses the terms" } else { "is used" };
+    let note = part.left_out_note(role);
+    Ok((Axis { measured, samples: part.rate.len(), left_out: part.left_out, found, warmth }, note))
 }
 
 /// What is in the log that no model of noise has.
@@ -381,12 +427,7 @@ fn wavelets(axis: &Axis) -> WaveletDocument {
     }
 }
 
-fn document<'a>(
-    params: &'a Params,
-    axes: &'a [Axis],
-    readings: &'a [(Recording, LogCheck)],
-    method: Method,
-) -> Document<'a> {
+fn document<'a>(params: &'a Params, axes: &'a [Axis], log: &'a Log, method: Method) -> Document<'a> {
     let axis = |axis: &'a Axis| {
         let Axis { measured, found, .. } = axis;
         let points = &found.curve.points;
@@ -406,8 +447,8 @@ fn document<'a>(
     };
     let axes = axes.iter().map(|a| AxisDocument {
         name: &a.found.params.name,
-        samples: a.part.rate.len(),
-        left_out: a.part.left_out,
+        samples: a.samples,
+        left_out: a.left_out,
         first_tau_s: a.found.first_tau_s,
         fit_p_value: a.found.fit_p_value.is_finite().then_some(a.found.fit_p_value),
         candidates: &a.found.candidates,
@@ -419,7 +460,7 @@ fn document<'a>(
         allan: axis(a),
         wavelet_variance: (method == Method::Gmwm).then(|| wavelets(a)),
     });
-    let mut logs = readings.iter().map(|(_, check)| check);
+    let mut logs = log.checks.iter();
     let log = logs.next();
     Document {
         format: "kfdesign-identify/1",
@@ -482,7 +523,7 @@ fn text(axis: &Axis, quantity: Quantity) -> String {
 /// "gyro_x: white+gm, 720000 samples in 2 h".
 fn headline(axis: &Axis) -> String {
     let Axis { found, .. } = axis;
-    let samples = axis.part.rate.len();
+    let samples = axis.samples;
     let span = duration(samples as f64 * found.curve.dt);
     match found.candidates.iter().find(|c| c.chosen) {
         Some(chosen) => {

@@ -27,6 +27,7 @@ pub mod simulate;
 mod stretch;
 mod tests_table;
 pub mod tune;
+mod windows;
 
 use std::process::ExitCode;
 

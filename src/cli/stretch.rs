@@ -112,7 +112,7 @@ fn stretch(name: &str, unit: &Unit, values: Cow<'_, [f64]>, recording: &Recordin
 }
 
 /// Increments and angles as rate.
-fn rate(values: &[f64], kind: InputKind, dt: f64) -> Vec<f64> {
+pub(super) fn rate(values: &[f64], kind: InputKind, dt: f64) -> Vec<f64> {
     match kind {
         InputKind::Rate => values.to_vec(),
         InputKind::Increments => values.iter().map(|v| v / dt).collect(),

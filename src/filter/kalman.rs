@@ -4,6 +4,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::large;
 use super::transition::SparseTransition;
 use crate::model::LinearModel;
 
@@ -106,6 +107,7 @@ impl Kalman {
         let (f, q) = (self.f.as_slice(), self.q.as_slice());
         let (x, p) = (self.x.as_mut_slice(), self.p.as_mut_slice());
         match (x.len(), &self.sparse) {
+            (0, _) => {}
             (1, _) => predict_slices::<1>(f, q, x, p),
             (2, _) => predict_slices::<2>(f, q, x, p),
             (3, _) => predict_slices::<3>(f, q, x, p),
@@ -113,7 +115,7 @@ impl Kalman {
             (5, _) => predict_slices::<5>(f, q, x, p),
             (6, _) => predict_slices::<6>(f, q, x, p),
             (_, Some(sparse)) => sparse.predict(q, x, p, vector, matrix),
-            (n, None) => predict_kernel(n, f, q, x, p, vector, matrix),
+            (_, None) => large::predict(f, q, x, p, vector, matrix),
         }
     }
 
@@ -155,8 +157,8 @@ impl Kalman {
         }
         let mut left = n;
         while left > 0 {
-            if left & 1 == 1 {
-                predict_kernel(states, power, noise, x, p, vector, matrix);
+            if left & 1 == 1 && states > 0 {
+                large::predict(power, noise, x, p, vector, matrix);
             }
             left >>= 1;
             if left > 0 {
@@ -182,13 +184,14 @@ impl Kalman {
         let Scratch { vector, matrix, .. } = &mut self.scratch;
         let (x, p) = (self.x.as_mut_slice(), self.p.as_mut_slice());
         match n {
+            0 => Update::new(z, measurement.r, measurement.gate),
             1 => update_slices::<1>(&measurement, x, p),
             2 => update_slices::<2>(&measurement, x, p),
             3 => update_slices::<3>(&measurement, x, p),
             4 => update_slices::<4>(&measurement, x, p),
             5 => update_slices::<5>(&measurement, x, p),
             6 => update_slices::<6>(&measurement, x, p),
-            n => update_kernel(n, &measurement, x, p, vector, matrix),
+            _ => large::update(&measurement, x, p, vector, matrix),
         }
     }
 }
@@ -205,21 +208,20 @@ impl Kalman {
 }
 
 /// A scalar measurement z = h x + v, v ~ N(0, r).
-struct Measurement<'a> {
-    h: &'a [f64],
-    r: f64,
-    z: f64,
-    gate: f64,
+pub(super) struct Measurement<'a> {
+    pub(super) h: &'a [f64],
+    pub(super) r: f64,
+    pub(super) z: f64,
+    pub(super) gate: f64,
 }
 
 /// The first `N` columns of `N` numbers.
 #[inline(always)]
 pub(super) fn square<const N: usize>(numbers: &[f64]) -> [[f64; N]; N] {
-    let columns = &numbers.as_chunks::<N>().0[..N];
-    std::array::from_fn(|j| columns[j])
+    std::array::from_fn(|j| std::array::from_fn(|i| numbers[j * N + i]))
 }
 
-/// [`predict_kernel`] of a known size, in registers; the same operations in the same order.
+/// [`large::predict`] of a known size, in registers; the same operations in the same order.
 #[inline(always)]
 pub(super) fn predict_fixed<const N: usize>(
     f: &[[f64; N]; N],
@@ -255,7 +257,7 @@ pub(super) fn predict_fixed<const N: usize>(
     }
 }
 
-/// [`update_kernel`] of a known size.
+/// [`large::update`] of a known size.
 #[inline(always)]
 pub(super) fn update_fixed<const N: usize>(
     h: &[f64; N],
@@ -285,12 +287,8 @@ pub(super) fn update_fixed<const N: usize>(
     }
     let mut t = [[0.0; N]; N];
     for j in 0..N {
-        let mut h_p = 0.0;
         for i in 0..N {
-            h_p += h[i] * p[j][i];
-        }
-        for i in 0..N {
-            t[j][i] = p[j][i] - gain[i] * h_p;
+            t[j][i] = p[j][i] - gain[i] * v[j];
         }
     }
     for i in 0..N {
@@ -298,8 +296,9 @@ pub(super) fn update_fixed<const N: usize>(
         for j in 0..N {
             t_h += t[j][i] * h[j];
         }
+        let rest = t_h - gain[i] * r;
         for j in 0..=i {
-            let value = t[j][i] - t_h * gain[j] + gain[i] * r * gain[j];
+            let value = t[j][i] - rest * gain[j];
             p[j][i] = value;
             p[i][j] = value;
         }
@@ -325,101 +324,6 @@ fn update_slices<const N: usize>(measurement: &Measurement<'_>, x: &mut [f64], p
         p.copy_from_slice(covariance.as_flattened());
     }
     update
-}
-
-/// x ← F x, P ← F P Fᵀ + Q; F, Q, P by columns. Only one triangle of P is computed, so it stays exactly symmetric.
-#[inline(always)]
-fn predict_kernel(n: usize, f: &[f64], q: &[f64], x: &mut [f64], p: &mut [f64], v: &mut [f64], m: &mut [f64]) {
-    let (f, q, x, v) = (&f[..n * n], &q[..n * n], &mut x[..n], &mut v[..n]);
-    let (p, m) = (&mut p[..n * n], &mut m[..n * n]);
-    for i in 0..n {
-        let mut sum = 0.0;
-        for k in 0..n {
-            sum += f[i + n * k] * x[k];
-        }
-        v[i] = sum;
-    }
-    x.copy_from_slice(v);
-    for j in 0..n {
-        for i in 0..n {
-            let mut sum = 0.0;
-            for k in 0..n {
-                sum += f[i + n * k] * p[k + n * j];
-            }
-            m[i + n * j] = sum;
-        }
-    }
-    for j in 0..n {
-        for i in j..n {
-            let mut sum = q[i + n * j];
-            for k in 0..n {
-                sum += m[i + n * k] * f[j + n * k];
-            }
-            p[i + n * j] = sum;
-            p[j + n * i] = sum;
-        }
-    }
-}
-
-/// One scalar update; `v` and `m` are scratch of n and n² numbers.
-#[inline(always)]
-fn update_kernel(
-    n: usize,
-    measurement: &Measurement<'_>,
-    x: &mut [f64],
-    p: &mut [f64],
-    v: &mut [f64],
-    m: &mut [f64],
-) -> Update {
-    let &Measurement { h, r, z, gate } = measurement;
-    let (h, x, v) = (&h[..n], &mut x[..n], &mut v[..n]);
-    let (p, m) = (&mut p[..n * n], &mut m[..n * n]);
-    let (mut predicted, mut variance) = (0.0, r);
-    for i in 0..n {
-        let mut sum = 0.0;
-        for k in 0..n {
-            sum += p[i + n * k] * h[k];
-        }
-        v[i] = sum; // P hᵀ
-        predicted += h[i] * x[i];
-        variance += h[i] * sum;
-    }
-    let innovation = z - predicted;
-    let update = Update::new(innovation, variance, gate);
-    if update.accepted {
-        let weight = 1.0 / variance;
-        for i in 0..n {
-            v[i] *= weight; // K
-            x[i] += v[i] * innovation;
-        }
-        joseph(n, v, h, r, p, m);
-    }
-    update
-}
-
-/// P ← (I − K h) P (I − K h)ᵀ + K r Kᵀ with T = (I − K h) P formed first: n² work for a scalar measurement.
-#[inline(always)]
-fn joseph(n: usize, k: &[f64], h: &[f64], r: f64, p: &mut [f64], t: &mut [f64]) {
-    for j in 0..n {
-        let mut h_p = 0.0;
-        for i in 0..n {
-            h_p += h[i] * p[i + n * j];
-        }
-        for i in 0..n {
-            t[i + n * j] = p[i + n * j] - k[i] * h_p;
-        }
-    }
-    for i in 0..n {
-        let mut t_h = 0.0;
-        for j in 0..n {
-            t_h += t[i + n * j] * h[j];
-        }
-        for j in 0..=i {
-            let value = t[i + n * j] - t_h * k[j] + k[i] * r * k[j];
-            p[i + n * j] = value;
-            p[j + n * i] = value;
-        }
-    }
 }
 
 /// Q ← Q + F Q Fᵀ, then D ← 2D + D², F ← I + D.

@@ -24,6 +24,7 @@ pub mod gains;
 pub mod innovations;
 pub mod judge;
 pub mod kalman;
+mod large;
 pub mod likelihood;
 pub mod mismatch;
 mod reading;

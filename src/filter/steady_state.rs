@@ -220,12 +220,3 @@ fn select(a: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
 fn columns(a: &DMatrix<f64>, columns: &[usize]) -> DMatrix<f64> {
     DMatrix::from_fn(a.nrows(), columns.len(), |i, j| a[(i, columns[j])])
 }
-/// Whether a covariance has stopped moving: no entry differs from that of the step before by more than four roundings of its diagonal.
-pub(super) fn has_settled(before: &DMatrix<f64>, now: &DMatrix<f64>) -> bool {
-    let n = now.nrows();
-    let still = |i: usize, j: usize| {
-        let scale = (now[(i, i)] * now[(j, j)]).sqrt();
-        (now[(i, j)] - before[(i, j)]).abs() <= 4.0 * f64::EPSILON * scale
-    };
-    (0..n).all(|i| (0..=i).all(|j| still(i, j)))
-}

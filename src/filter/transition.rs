@@ -2,6 +2,8 @@
 
 use nalgebra::DMatrix;
 
+use super::large;
+
 /// Fewer states are faster with loops of known size.
 const FEWEST: usize = 7;
 
@@ -34,22 +36,6 @@ impl SparseTransition {
 
     /// x ← F x, P ← F P Fᵀ + Q by columns; exactly symmetric when Q is. `v`: n numbers, `m`: n².
     pub(super) fn predict(&self, q: &[f64], x: &mut [f64], p: &mut [f64], v: &mut [f64], m: &mut [f64]) {
-        let n = self.n;
-        self.times(x, v);
-        x.copy_from_slice(v);
-        // (F P)ᵀ = P Fᵀ since P is symmetric, column by column of Fᵀ
-        m.fill(0.0);
-        for &(i, j, f) in &self.entries {
-            let (from, to) = (&p[j * n..][..n], &mut m[i * n..][..n]);
-            to.iter_mut().zip(from).for_each(|(t, p)| *t += f * p);
-        }
-        self.times(m, p);
-        for j in 0..n {
-            for i in j..n {
-                let value = p[i + n * j] + q[i + n * j];
-                p[i + n * j] = value;
-                p[j + n * i] = value;
-            }
-        }
+        large::predict_sparse(&self.entries, q, x, p, v, m);
     }
 }

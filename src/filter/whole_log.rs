@@ -11,9 +11,13 @@
 use nalgebra::{DMatrix, DVector};
 use pulp::{Arch, NullaryFnOnce};
 
+mod approach;
+mod settled;
+
+use self::approach::{Approach, Came, LOOK};
+use self::settled::{Bias, Run, Settled};
 use super::Kalman;
 use super::kalman::{predict_fixed, square, update_fixed};
-use super::steady_state::has_settled;
 use crate::model::LinearModel;
 
 /// Innovations of a log of the first measurement of `model`, one at every step; inputs are zero, other measurements are not taken.
@@ -25,17 +29,21 @@ use crate::model::LinearModel;
 /// more seldom, carry their covariance from step to step.
 pub fn innovations(model: &LinearModel, z: &[f64], innovation: &mut [f64], nis: &mut [f64]) -> f64 {
     assert!(z.len() == innovation.len() && z.len() == nis.len(), "as many results as samples");
-    let log_likelihood = match TwoStage::new(model) {
-        Some(mut filter) => {
-            filter.run(z, innovation, nis);
-            filter.log_likelihood()
+    let squares = |innovation: &[f64], weight: &mut [f64]| {
+        for (weight, v) in weight.iter_mut().zip(innovation) {
+            *weight *= *v * *v;
         }
-        None => carried(model, z, innovation, nis),
     };
-    for (nis, v) in nis.iter_mut().zip(innovation) {
-        *nis *= *v * *v;
+    let Some(mut filter) = TwoStage::new(model) else {
+        let log_likelihood = carried(model, z, innovation, nis);
+        squares(innovation, nis);
+        return log_likelihood;
+    };
+    for ((z, innovation), nis) in z.chunks(PIECE).zip(innovation.chunks_mut(PIECE)).zip(nis.chunks_mut(PIECE)) {
+        filter.run(z, innovation, nis);
+        squares(innovation, nis);
     }
-    log_likelihood
+    filter.log_likelihood()
 }
 
 /// ν and 1/S by a filter that carries its whole covariance from step to step; hands back ln L.
@@ -68,9 +76,6 @@ pub fn carried(model: &LinearModel, z: &[f64], innovation: &mut [f64], weight: &
     }
 }
 
-/// Variances whose product is taken before its logarithm: a variance between 1e-18 and 1e18 cannot make it over- or underflow.
-const FACTORS: usize = 16;
-
 /// A filter of `N` states in registers, compiled for each instruction set.
 struct Carried<'a, const N: usize> {
     model: &'a LinearModel,
@@ -88,7 +93,7 @@ impl<const N: usize> NullaryFnOnce for Carried<'_, N> {
         let (h, r) = (std::array::from_fn(|i| model.h[(0, i)]), model.r[(0, 0)]);
         let (mut x, mut p) = (std::array::from_fn(|i| model.x0[i]), square::<N>(model.p0.as_slice()));
         let (mut log_variance, mut nis, mut count, mut started) = (0.0, 0.0, 0_u64, false);
-        let parts = z.chunks(FACTORS).zip(innovation.chunks_mut(FACTORS)).zip(weight.chunks_mut(FACTORS));
+        let parts = z.chunks(LOOK).zip(innovation.chunks_mut(LOOK)).zip(weight.chunks_mut(LOOK));
         for ((z, innovation), weight) in parts {
             let mut product = 1.0;
             for ((z, innovation), weight) in z.iter().zip(innovation).zip(weight) {
@@ -113,8 +118,8 @@ impl<const N: usize> NullaryFnOnce for Carried<'_, N> {
 
 /// The states that are not the bias: most that are kept in registers.
 const MOST: usize = 6;
-/// Innovations whose squares are added up at once.
-const BLOCK: usize = 1024;
+/// Samples whose results stay in the nearest caches until they are used again.
+const PIECE: usize = 8192;
 
 /// A time-invariant filter with one measurement at every step, in two stages.
 #[derive(Clone, Debug)]
@@ -122,6 +127,7 @@ pub struct TwoStage {
     /// The filter without the bias.
     rest: Kalman,
     f: DMatrix<f64>,
+    q: DMatrix<f64>,
     h: DVector<f64>,
     r: f64,
     /// F of the bias into the other states; h of the bias.
@@ -140,9 +146,8 @@ pub struct TwoStage {
     count: u64,
     /// A sample was taken: the next begins with a prediction.
     started: bool,
-    /// P(k|k−1) and the answer of the sample before.
-    before: DMatrix<f64>,
-    answered: DVector<f64>,
+    /// Covariance of the states beside the bias, and their answer to it, no longer change.
+    still: bool,
     spare: DVector<f64>,
 }
 
@@ -170,10 +175,10 @@ impl TwoStage {
         Some(TwoStage {
             place: bias,
             started: false,
-            before: DMatrix::from_element(kept.len(), kept.len(), f64::NAN),
-            answered: DVector::from_element(kept.len(), f64::NAN),
+            still: false,
             spare: DVector::zeros(kept.len()),
             f: rest.f.clone(),
+            q: rest.q.clone(),
             h: rest.h.row(0).transpose(),
             r: rest.r[(0, 0)],
             couple: bias.map_or_else(|| DVector::zeros(kept.len()), |b| of_bias(model.f.column(b).into_owned())),
@@ -192,20 +197,34 @@ impl TwoStage {
     pub fn run(&mut self, z: &[f64], innovation: &mut [f64], weight: &mut [f64]) {
         let mut at = 0;
         while at < z.len() {
+            if self.started && !self.still {
+                let (z, innovation, weight) = (&z[at..], &mut innovation[at..], &mut weight[at..]);
+                let came = match self.h.len() {
+                    0 => self.approach::<0>(z, innovation, weight),
+                    1 => self.approach::<1>(z, innovation, weight),
+                    2 => self.approach::<2>(z, innovation, weight),
+                    3 => self.approach::<3>(z, innovation, weight),
+                    4 => self.approach::<4>(z, innovation, weight),
+                    5 => self.approach::<5>(z, innovation, weight),
+                    _ => self.approach::<MOST>(z, innovation, weight),
+                };
+                at += came;
+                if came > 0 {
+                    continue;
+                }
+            }
             if self.started {
                 self.predict();
             }
             self.started = true;
             if !z[at].is_finite() {
                 (innovation[at], weight[at]) = (f64::NAN, f64::NAN);
-                self.before.fill(f64::NAN);
+                self.still = false;
                 at += 1;
                 continue;
             }
-            let still = |(a, b): (&f64, &f64)| (a - b).abs() <= 4.0 * f64::EPSILON * a.abs();
-            let settled = has_settled(&self.before, &self.rest.p) && self.answer.iter().zip(&self.answered).all(still);
             // the last sample of a stretch is not among the settled, so that the state is that after it
-            let end = if settled {
+            let end = if self.still {
                 z[at..].iter().position(|z| !z.is_finite()).map_or(z.len(), |bad| at + bad) - 1
             } else {
                 at
@@ -223,8 +242,6 @@ impl TwoStage {
                 }
                 at = end;
             }
-            self.before.copy_from(&self.rest.p);
-            self.answered.copy_from(&self.answer);
             (innovation[at], weight[at]) = self.update(z[at]);
             at += 1;
         }
@@ -248,7 +265,7 @@ impl TwoStage {
         } else {
             (0..steps).for_each(|_| self.predict());
         }
-        self.before.fill(f64::NAN);
+        self.still = false;
     }
 
     /// ln L of all samples so far.
@@ -288,6 +305,36 @@ impl TwoStage {
         (innovation, 1.0 / variance)
     }
 
+    /// Samples while the gains still change; hands back how many were taken.
+    fn approach<const N: usize>(&mut self, z: &[f64], innovation: &mut [f64], weight: &mut [f64]) -> usize {
+        let [mut x, mut answer] = [&self.rest.x, &self.answer].map(|x| std::array::from_fn(|i| x[i]));
+        let mut p = square::<N>(self.rest.p.as_slice());
+        let came: Came = Arch::new().dispatch(Approach {
+            f: square::<N>(self.f.as_slice()),
+            q: square::<N>(self.q.as_slice()),
+            h: std::array::from_fn(|i| self.h[i]),
+            r: self.r,
+            couple: std::array::from_fn(|i| self.couple[i]),
+            seen: self.seen,
+            x: &mut x,
+            p: &mut p,
+            answer: &mut answer,
+            bias: &mut self.bias,
+            information: &mut self.information,
+            z,
+            innovation,
+            weight,
+        });
+        self.rest.x.copy_from_slice(&x);
+        self.rest.p.copy_from_slice(p.as_flattened());
+        self.answer.copy_from_slice(&answer);
+        self.log_variance += came.log_variance;
+        self.nis += came.nis;
+        self.count += came.samples as u64;
+        self.still = came.settled;
+        came.samples
+    }
+
     /// Samples with everything but the bias settled; x is predicted for the first, and afterwards for the one that follows the last.
     fn settled<const N: usize>(&mut self, z: &[f64], innovation: &mut [f64], weight: &mut [f64]) {
         let direction = &self.rest.p * &self.h;
@@ -295,127 +342,22 @@ impl TwoStage {
         let driven = &self.f * direction / variance;
         let closed = &self.f - &driven * self.h.transpose();
         let s = self.seen + self.h.dot(&self.answer);
-        let mut run = Settled::<N> {
-            closed: std::array::from_fn(|i| std::array::from_fn(|j| closed[(i, j)])),
-            driven: std::array::from_fn(|i| driven[i]),
-            h: std::array::from_fn(|i| self.h[i]),
-            x: std::array::from_fn(|i| self.rest.x[i]),
-            s,
-            weight: 1.0 / variance,
-            more: s * s / variance,
-            start: self.information,
-            steps: 0.0,
-            bias: self.bias,
-        };
-        self.nis += Arch::new().dispatch(Run { gains: &mut run, z, innovation, weight });
-        self.rest.x.copy_from_slice(&run.x);
+        let mut gains = Settled::<N>::new(
+            std::array::from_fn(|i| std::array::from_fn(|j| closed[(i, j)])),
+            std::array::from_fn(|i| driven[i]),
+            std::array::from_fn(|i| self.h[i]),
+            std::array::from_fn(|i| self.rest.x[i]),
+            Bias::new(s, 1.0 / variance, self.information, self.bias),
+        );
+        self.nis += Arch::new().dispatch(Run { gains: &mut gains, z, innovation, weight });
+        self.rest.x.copy_from_slice(&gains.x);
         self.count += z.len() as u64;
         self.log_variance += z.len() as f64 * variance.ln();
+        self.bias = gains.bias.estimate();
         if self.information.is_finite() {
-            let information = run.information();
+            let information = gains.bias.information();
             self.log_variance += (information / self.information).ln();
-            (self.information, self.bias) = (information, run.bias);
+            self.information = information;
         }
-    }
-}
-
-/// The recursion with constant gains: `N` states and the bias.
-struct Settled<const N: usize> {
-    /// F (I − K h) by rows, F K, h.
-    closed: [[f64; N]; N],
-    driven: [f64; N],
-    h: [f64; N],
-    /// x(k|k−1) without the bias.
-    x: [f64; N],
-    s: f64,
-    /// 1/S̃, and s²/S̃, the information that each sample adds.
-    weight: f64,
-    more: f64,
-    /// Information at the first of these samples, and how many there were since.
-    start: f64,
-    steps: f64,
-    bias: f64,
-}
-
-impl<const N: usize> Settled<N> {
-    /// Summed by multiplication, so that many small additions do not round it away.
-    #[inline(always)]
-    fn information(&self) -> f64 {
-        self.start + self.steps * self.more
-    }
-
-    /// ν̃, and the next prediction.
-    #[inline(always)]
-    fn step(&mut self, z: f64) -> f64 {
-        let mut rest = z;
-        for (h, x) in self.h.iter().zip(&self.x) {
-            rest -= h * x;
-        }
-        let mut next = self.driven.map(|k| k * z);
-        for (next, row) in next.iter_mut().zip(&self.closed) {
-            for (f, x) in row.iter().zip(&self.x) {
-                *next += f * x;
-            }
-        }
-        self.x = next;
-        rest
-    }
-
-    /// Writes ν and 1/S of at most [`BLOCK`] samples, hands back Σ ν²/S.
-    ///
-    /// What does not depend on the data, and what does not depend on the sample before, is done for many samples by one instruction.
-    #[inline(always)]
-    fn block(&mut self, z: &[f64], innovation: &mut [f64], weight: &mut [f64]) -> f64 {
-        // b̂ ← (1 − s g) b̂ + g ν̃ with the gain g = s/S̃/I; 1/S = I/(I + s²/S̃)/S̃
-        let [mut gain, mut kept, mut biases] = [[0.0; BLOCK]; 3];
-        if self.start.is_finite() {
-            for (k, ((gain, kept), weight)) in gain.iter_mut().zip(&mut kept).zip(&mut *weight).enumerate() {
-                let before = self.start + (self.steps + k as f64) * self.more;
-                let inverse = 1.0 / (self.start + (self.steps + (k + 1) as f64) * self.more);
-                *gain = self.s * self.weight * inverse;
-                *kept = 1.0 - *gain * self.s;
-                *weight = before * inverse * self.weight;
-            }
-        } else {
-            kept = [1.0; BLOCK];
-            weight.fill(self.weight);
-        }
-        let mut bias = self.bias;
-        for ((((z, v), b), gain), kept) in z.iter().zip(&mut *innovation).zip(&mut biases).zip(&gain).zip(&kept) {
-            let rest = self.step(*z);
-            (*v, *b) = (rest, bias);
-            bias = kept * bias + gain * rest;
-        }
-        self.bias = bias;
-        self.steps += z.len() as f64;
-        let mut sums = [0.0; 8];
-        for ((v, weight), biases) in innovation.chunks_mut(8).zip(weight.chunks(8)).zip(biases.chunks(8)) {
-            for (((sum, v), weight), bias) in sums.iter_mut().zip(v).zip(weight).zip(biases) {
-                *v -= self.s * bias;
-                *sum += *v * *v * weight;
-            }
-        }
-        sums.iter().sum()
-    }
-}
-
-/// A stretch with settled gains, compiled for each instruction set; hands back Σ ν²/S.
-struct Run<'a, const N: usize> {
-    gains: &'a mut Settled<N>,
-    z: &'a [f64],
-    innovation: &'a mut [f64],
-    weight: &'a mut [f64],
-}
-
-impl<const N: usize> NullaryFnOnce for Run<'_, N> {
-    type Output = f64;
-    #[inline(always)]
-    fn call(self) -> f64 {
-        let blocks = self.z.chunks(BLOCK).zip(self.innovation.chunks_mut(BLOCK)).zip(self.weight.chunks_mut(BLOCK));
-        let mut sum = 0.0;
-        for ((z, innovation), weight) in blocks {
-            sum += self.gains.block(z, innovation, weight);
-        }
-        sum
     }
 }

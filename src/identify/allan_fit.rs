@@ -13,6 +13,7 @@ use super::{Candidate, Identified, IdentifyError, LENGTHS_TO_TELL, ModelChoice, 
 use crate::allan::{self, AllanCurve, Deviation, TauGrid};
 use crate::noise::{Kind, NoiseModel, Term};
 use crate::numerics::distribution::NORMAL_95;
+use crate::numerics::reduce::mean;
 use crate::params::{AxisParams, NotIdentified};
 use crate::units::{Unit, digits};
 
@@ -78,7 +79,7 @@ pub(super) fn identify(
     Ok(Identified {
         params: AxisParams {
             name: name.into(),
-            bias: Some(bias(rate, dt, &model, display)),
+            bias: Some(bias(mean(rate), rate.len(), dt, &model, display)),
             turn_on_bias: None,
             temperature: None,
             terms: known.iter().map(|(term, intervals)| entry(term, intervals, display)).collect::<Result<_, _>>()?,

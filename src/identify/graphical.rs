@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::{Identified, IdentifyError, bias, entry, usable};
 use crate::allan::{self, AllanCurve, AllanPoint, Deviation, TauGrid, edf};
 use crate::noise::{NoiseModel, Term};
-use crate::numerics::reduce::{Moments, Sum};
+use crate::numerics::reduce::{Moments, Sum, mean};
 use crate::params::{AxisParams, NotIdentified};
 use crate::units::{Unit, digits};
 
@@ -103,7 +103,7 @@ pub(super) fn identify(name: &str, rate: &[f64], dt: f64, display: &Unit) -> Res
     Ok(Identified {
         params: AxisParams {
             name: name.into(),
-            bias: Some(bias(rate, dt, &model, display)),
+            bias: Some(bias(mean(rate), rate.len(), dt, &model, display)),
             turn_on_bias: None,
             temperature: None,
             terms: model.terms.iter().map(|t| entry(t, &[None, None], display)).collect::<Result<_, _>>()?,

@@ -10,14 +10,13 @@ mod selection;
 mod shape;
 mod weighted_fit;
 
-pub use likelihood::{Fitted, plan, temperature};
+pub use likelihood::{Fitted, maximum, plan, temperature, windows};
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::allan::AllanCurve;
 use crate::filter::likelihood::Stretch;
 use crate::noise::{Kind, NoiseModel, Term};
-use crate::numerics::reduce::mean;
 use crate::params::{AxisParams, Measured, NotIdentified, TermEntry};
 use crate::units::{Unit, digits};
 pub use likelihood::shared::{SharedTime, TimeProfile, shared_time};
@@ -263,9 +262,8 @@ fn entry(term: &Term, intervals: &[Option<[f64; 2]>], display: &Unit) -> Result<
 }
 
 /// The mean of the log with its 95 % interval for the constant bias; see [`NoiseModel::mean_variance`].
-fn bias(rate: &[f64], dt: f64, model: &NoiseModel, display: &Unit) -> Measured {
-    let sigma = model.mean_variance(rate.len() as u64, dt).sqrt();
-    let value = mean(rate);
-    let interval = (!model.terms.is_empty()).then_some([value - 1.96 * sigma, value + 1.96 * sigma]);
-    Measured::from_si(value, interval, display.times_time(0))
+fn bias(mean: f64, samples: usize, dt: f64, model: &NoiseModel, display: &Unit) -> Measured {
+    let sigma = model.mean_variance(samples as u64, dt).sqrt();
+    let interval = (!model.terms.is_empty()).then_some([mean - 1.96 * sigma, mean + 1.96 * sigma]);
+    Measured::from_si(mean, interval, display.times_time(0))
 }

@@ -6,9 +6,9 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::course::AxisCourse;
+use super::course::{AxisCourse, Channel};
 use super::engine::Course;
-use super::lanes::{LANES, Lane, Scratch};
+use super::lanes::{Aligned, CHUNK, ChannelSums, LANES, Lane, Scratch};
 use crate::filter::Kalman;
 use crate::numerics::distribution::chi_square_quantile;
 
@@ -45,19 +45,20 @@ pub(super) struct Judged {
     /// Per step W A, then W B, by rows, with W the whitening of the claimed covariance of e = A x − B x̂.
     pub(super) whiten: Arc<[f64]>,
     pub(super) components: usize,
-    /// Σ over the runs of each lane.
-    pub(super) nees: Vec<Lane>,
-    pub(super) nis: Vec<Vec<Lane>>,
+    /// Of the steps of a chunk, each lane.
+    pub(super) nees: Aligned,
+    /// Σ over the runs so far, by steps.
+    nees_sum: Vec<f64>,
+    nis_sum: Vec<Vec<f64>>,
     /// 1 for the lanes that are runs, 0 for those beyond the last.
-    pub(super) used: Lane,
+    used: Lane,
 }
 
 /// Per step W A, then W B.
 fn whitening(axis: &AxisCourse) -> Arc<[f64]> {
-    let steps = axis.gains.steps as usize;
     let components = axis.judge.size();
     let (n, m) = (axis.filter.x0.len(), axis.truth.x0.len());
-    let mut whiten = Vec::with_capacity(steps * components * (n + m));
+    let mut covariances = Vec::with_capacity(axis.gains.steps as usize * n * n);
     let mut filter = Kalman::new(&axis.filter);
     for step in 0..axis.gains.steps {
         if step > 0 {
@@ -68,28 +69,38 @@ fn whitening(axis: &AxisCourse) -> Arc<[f64]> {
                 filter.update(i, 0.0, None);
             }
         }
-        let nothing = DMatrix::from_element(components, components, f64::NAN);
-        let root = axis.judge.whitening(&filter.p).unwrap_or(nothing);
-        for part in [&root * &axis.judge.of_truth, root * &axis.judge.of_estimate] {
-            whiten.extend(part.transpose().iter());
-        }
+        covariances.extend(filter.p.iter());
     }
+    let mut whiten = vec![0.0; axis.gains.steps as usize * components * (n + m)];
+    let steps = covariances.par_chunks_exact(n * n).zip(whiten.par_chunks_exact_mut(components * (n + m)));
+    steps.with_min_len(CHUNK).for_each(|(covariance, whiten)| {
+        let root = axis.judge.whitening(&DMatrix::from_column_slice(n, n, covariance));
+        let root = root.unwrap_or(DMatrix::from_element(components, components, f64::NAN));
+        let (of_truth, of_estimate) = whiten.split_at_mut(components * m);
+        for (part, whiten) in [(&root * &axis.judge.of_truth, of_truth), (root * &axis.judge.of_estimate, of_estimate)]
+        {
+            whiten.copy_from_slice(part.transpose().as_slice());
+        }
+    });
     whiten.into()
 }
 
 impl Judged {
     fn new(axis: &AxisCourse, whiten: Arc<[f64]>) -> Judged {
         let steps = axis.gains.steps as usize;
+        let mut nees = Aligned::new(CHUNK);
+        nees.grow(CHUNK);
         Judged {
             whiten,
             components: axis.judge.size(),
-            nees: vec![[0.0; LANES]; steps],
-            nis: vec![vec![[0.0; LANES]; steps]; axis.channels.len()],
+            nees,
+            nees_sum: vec![0.0; steps],
+            nis_sum: vec![vec![0.0; steps]; axis.channels.len()],
             used: [1.0; LANES],
         }
     }
 
-    /// Adds the NEES of a step.
+    /// The NEES of a step.
     #[inline(always)]
     pub(super) fn errors(&mut self, step: usize, truth: &[Lane], estimate: &[Lane]) {
         let (size, wide) = (self.components, truth.len() + estimate.len());
@@ -112,20 +123,41 @@ impl Judged {
                 nees[l] += u[l] * u[l];
             }
         }
-        for ((sum, nees), used) in self.nees[step].iter_mut().zip(nees).zip(self.used) {
-            *sum += nees * used;
+        self.nees.lanes_mut()[step % CHUNK] = nees;
+    }
+
+    /// Adds what the steps of a chunk left: their NEES, and the fresh normalised innovations of every measurement.
+    pub(super) fn absorb(&mut self, steps: Range<u64>, channels: &mut [ChannelSums], courses: &[Channel]) {
+        let used = self.used;
+        let chunk = steps.start as usize..steps.end as usize;
+        for (sum, nees) in self.nees_sum[chunk].iter_mut().zip(self.nees.lanes()) {
+            *sum += together(std::array::from_fn(|l| nees[l] * used[l]));
+        }
+        for ((sums, channel), course) in self.nis_sum.iter_mut().zip(channels).zip(courses) {
+            let taken = steps.clone().filter(|step| course.every <= 1 || step.is_multiple_of(course.every));
+            for (step, y) in taken.zip(&channel.y.lanes()[channel.lags..]) {
+                sums[step as usize] += together(std::array::from_fn(|l| y[l] * y[l] * used[l]));
+            }
+            channel.y.keep_last(channel.lags);
         }
     }
 
     fn clear(&mut self) {
-        self.nees.fill([0.0; LANES]);
-        self.nis.iter_mut().for_each(|nis| nis.fill([0.0; LANES]));
+        self.nees_sum.fill(0.0);
+        self.nis_sum.iter_mut().for_each(|nis| nis.fill(0.0));
     }
 }
 
-fn add(total: &mut [f64], lanes: &[Lane]) {
-    for (total, lane) in total.iter_mut().zip(lanes) {
-        *total += lane.iter().sum::<f64>();
+/// The sum of a lane, by halves.
+#[inline(always)]
+fn together(lane: Lane) -> f64 {
+    let [a, b, c, d]: [f64; 4] = std::array::from_fn(|l| lane[l] + lane[l + 4]);
+    (a + c) + (b + d)
+}
+
+fn add(total: &mut [f64], more: &[f64]) {
+    for (total, more) in total.iter_mut().zip(more) {
+        *total += more;
     }
 }
 
@@ -163,8 +195,8 @@ impl Course {
                 }
             });
             for judged in scratches[..here].iter().flatten().filter_map(|scratch| scratch.judged.as_ref()) {
-                add(&mut nees, &judged.nees);
-                nis.iter_mut().zip(&judged.nis).for_each(|(nis, lanes)| add(nis, lanes));
+                add(&mut nees, &judged.nees_sum);
+                nis.iter_mut().zip(&judged.nis_sum).for_each(|(nis, sums)| add(nis, sums));
             }
         }
         let components = axis.judge.size();

@@ -140,7 +140,6 @@ impl Stretch<'_, '_> {
                     let size = judged.components;
                     let rows = judged.whiten[step * size * 2 * N..][..size * 2 * N].as_chunks::<N>().0;
                     let (of_truth, of_estimate) = rows.split_at(size);
-                    let used = of(std::slice::from_ref(&judged.used), 0);
                     let mut nees = simd.splat_f64s(0.0);
                     for (a, b) in of_truth.iter().zip(of_estimate) {
                         let mut u = simd.splat_f64s(0.0);
@@ -150,14 +149,7 @@ impl Stretch<'_, '_> {
                         }
                         nees = simd.add_f64s(nees, simd.mul_f64s(u, u));
                     }
-                    let sums = [
-                        (&mut judged.nees[step], nees),
-                        (&mut judged.nis[0][step], simd.mul_f64s(normalised, normalised)),
-                    ];
-                    for (sum, value) in sums {
-                        let sum = &mut wide_mut::<S>(std::slice::from_mut(sum))[p];
-                        *sum = simd.add_f64s(*sum, simd.mul_f64s(value, used));
-                    }
+                    wide_mut::<S>(&mut judged.nees.lanes_mut()[step % CHUNK..][..1])[p] = nees;
                 }
             }
             for i in 0..N {
@@ -201,12 +193,6 @@ impl Stretch<'_, '_> {
                     *y = simd.mul_f64s(*v, weight);
                 }
                 channels[c].y.push(y);
-                if let Some(judged) = &mut *judged {
-                    let sum = &mut judged.nis[c][step as usize];
-                    for l in 0..LANES {
-                        sum[l] += y[l] * y[l] * judged.used[l];
-                    }
-                }
                 if let Some(observer) = &mut observer {
                     observer.update(c, &z, &innovation, &y);
                 }

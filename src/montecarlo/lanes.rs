@@ -34,7 +34,7 @@ pub(super) struct Aligned {
 
 impl Aligned {
     /// Room for so many lanes; empty.
-    fn new(capacity: usize) -> Aligned {
+    pub(super) fn new(capacity: usize) -> Aligned {
         let numbers = vec![0.0; (capacity + 1) * LANES];
         // where a platform cannot say, lanes are right but slower
         let offset = numbers.as_ptr().align_offset(size_of::<Lane>());
@@ -290,7 +290,8 @@ impl Source {
     }
 }
 
-/// Runs `runs` through the axis; results are in `scratch.values` and `scratch.counts`, one lane per run.
+/// Runs `runs` through the axis; results are in `scratch.values` and `scratch.counts`, one lane per run, or, where every step is judged,
+/// added up in `scratch.judged` and nowhere else.
 ///
 /// A run: x(0) ~ N(x0, P0), then z = H x + v, update with the gain of that step, x ← F x + w, and so on. The inner loops are compiled for
 /// each instruction set; operations and their order are the same in all, and so are the bits.
@@ -323,12 +324,14 @@ pub(super) fn simulate(
         *state = [*x0; LANES];
     }
     let (mut step, mut update) = (0, 0);
-    let mut epochs = axis.epochs.iter().enumerate().peekable();
+    // who asks for every step does not ask for epochs and sums
+    let epochs = if scratch.judged.is_some() { &[] } else { &*axis.epochs };
+    let mut epochs = epochs.iter().enumerate().peekable();
     while step < axis.gains.steps {
         for source in scratch.process.iter_mut().chain(&mut scratch.noise) {
             source.draw(arch);
         }
-        let end = (step + CHUNK as u64).min(axis.gains.steps);
+        let (first, end) = (step, (step + CHUNK as u64).min(axis.gains.steps));
         while step < end {
             // up to the next epoch, whose errors are judged
             let stop = epochs.peek().map_or(end, |(_, epoch)| (epoch.step + 1).min(end));
@@ -339,11 +342,18 @@ pub(super) fn simulate(
                 judge(epoch, i, &axis.layout, scratch);
             }
         }
+        if let Some(judged) = &mut scratch.judged {
+            judged.absorb(first..end, &mut scratch.channels, &axis.channels);
+            continue;
+        }
         for (c, (sums, channel)) in scratch.channels.iter_mut().zip(&axis.channels).enumerate() {
             let place = axis.layout.histogram(c);
             let histogram = scratch.counts.each_mut().map(|counts| &mut counts[place..=place + NIS_BINS]);
             arch.dispatch(Absorb { sums, base: channel.base, histogram });
         }
+    }
+    if scratch.judged.is_some() {
+        return;
     }
     for (c, (sums, channel)) in scratch.channels.iter_mut().zip(&axis.channels).enumerate() {
         sums.finish(channel, c, &axis.layout, &mut scratch.values);

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
 
 use super::rest::Rest;
-use super::{AttitudeModel, Layout};
+use super::{AttitudeModel, Layout, covariance};
 
 /// Before the first alignment: inclination 10 deg beside it, acceleration 1 m/s², heading uniform over the circle.
 const FIRST_INCLINATION: f64 = 10.0 * std::f64::consts::PI / 180.0;
@@ -48,6 +48,7 @@ pub struct Mekf {
     attitude: Option<UnitQuaternion<f64>>,
     x: DVector<f64>,
     p: DMatrix<f64>,
+    /// F and the noise of a step of each horizontal acceleration, for a size of 1.
     motion: (DMatrix<f64>, DMatrix<f64>),
     last_rate: Vector3<f64>,
     last_field: Option<Vector3<f64>>,
@@ -61,10 +62,13 @@ pub struct Mekf {
 struct Scratch {
     /// −R̂ dt times what turns with the gyro states and C.
     a: DMatrix<f64>,
-    /// A P.
+    /// P Aᵀ.
     w: DMatrix<f64>,
     ph: DVector<f64>,
     k: DVector<f64>,
+    /// Of a block of states: F x, P Fᵀ.
+    moved: Vec<f64>,
+    columns: Vec<f64>,
 }
 
 /// Mean square of the vertical acceleration.
@@ -107,9 +111,10 @@ impl Mekf {
         for i in layout.scale..layout.scale + 9 {
             p[(i, i)] = model.scale_std_dev.powi(2);
         }
-        let motion = model.acceleration.process(model.dt);
+        let (f, stationary) = model.acceleration.process(model.dt);
+        let gained = &stationary - &f * &stationary * f.transpose();
         for first in [layout.motion, layout.motion + 2] {
-            p.view_mut((first, first), (2, 2)).copy_from(&(&motion.1 * FIRST_ACCELERATION.powi(2)));
+            p.view_mut((first, first), (2, 2)).copy_from(&(&stationary * FIRST_ACCELERATION.powi(2)));
         }
         if let Some(heading) = &model.heading {
             p[(layout.heading, layout.heading)] = heading.disturbance.powi(2);
@@ -119,9 +124,11 @@ impl Mekf {
         Mekf {
             scratch: Scratch {
                 a: DMatrix::zeros(3, turning),
-                w: DMatrix::zeros(3, n),
+                w: DMatrix::zeros(n, 3),
                 ph: DVector::zeros(n),
                 k: DVector::zeros(n),
+                moved: vec![0.0; n],
+                columns: vec![0.0; n * n],
             },
             rest: Rest::new(model.rest, model.dt),
             model: model.clone(),
@@ -129,7 +136,7 @@ impl Mekf {
             attitude: None,
             x,
             p,
-            motion,
+            motion: (f, gained),
             last_rate: Vector3::zeros(),
             last_field: None,
             vertical: Witness::default(),
@@ -271,32 +278,29 @@ impl Mekf {
                 }
             }
         }
-        w.gemm(1.0, a, &self.p.rows(3, a.ncols()), 0.0);
-        for i in 0..3 {
-            for j in 0..3 {
-                let squares: f64 = (0..a.ncols()).map(|c| w[(i, 3 + c)] * a[(j, c)]).sum();
-                self.p[(i, j)] += w[(i, j)] + w[(j, i)] + squares;
-            }
-        }
-        for j in 3..self.layout.states {
-            for i in 0..3 {
-                self.p[(i, j)] += w[(i, j)];
-                self.p[(j, i)] = self.p[(i, j)];
-            }
-        }
+        covariance::turn(self.p.as_mut_slice(), a.as_slice(), w.as_mut_slice());
     }
 
     /// x and P of every state but the rotation, block by block.
     fn propagate_states(&mut self) {
-        let Mekf { model, layout, x, p, motion, vertical, field, .. } = self;
+        let Mekf { model, layout, x, p, motion, vertical, field, scratch, .. } = self;
+        let mut block = |first: usize, f: &DMatrix<f64>, q: &DMatrix<f64>, size: f64| {
+            let m = f.nrows();
+            let moved = &mut scratch.moved[..m];
+            for (i, moved) in moved.iter_mut().enumerate() {
+                *moved = (0..m).map(|j| f[(i, j)] * x[first + j]).sum();
+            }
+            x.as_mut_slice()[first..first + m].copy_from_slice(moved);
+            let n = x.len();
+            covariance::propagate(p.as_mut_slice(), n, first, f.as_slice(), q.as_slice(), size, &mut scratch.columns);
+        };
         for (gyro, &first) in model.gyro.iter().zip(&layout.gyro) {
-            block(x, p, first, &gyro.f, &gyro.q, 1.0);
+            block(first, &gyro.f, &gyro.q, 1.0);
         }
         let size = model.acceleration.std_dev.powi(2) + model.acceleration.ratio.powi(2) * vertical.mean_square;
-        let (f, stationary) = motion;
-        let q = &*stationary - &*f * &*stationary * f.transpose();
+        let (f, gained) = motion;
         for first in [layout.motion, layout.motion + 2] {
-            block(x, p, first, f, &q, size);
+            block(first, f, gained, size);
         }
         field.since += model.dt;
         if let Some(heading) = &model.heading {
@@ -424,38 +428,8 @@ impl Mekf {
             k[i] = if gains(i) { ph[i] / inflated } else { 0.0 };
         }
         x.axpy(innovation, k, 1.0);
-        for j in 0..n {
-            for i in 0..=j {
-                let value = p[(i, j)] - k[i] * ph[j] - ph[i] * k[j] + inflated * k[i] * k[j];
-                p[(i, j)] = value;
-                p[(j, i)] = value;
-            }
-        }
+        covariance::take_in(p.as_mut_slice(), k.as_slice(), ph.as_mut_slice(), inflated);
         normalised
-    }
-}
-
-/// x ← F x, P ← F P Fᵀ + `size` Q of the states from `first` on.
-fn block(x: &mut DVector<f64>, p: &mut DMatrix<f64>, first: usize, f: &DMatrix<f64>, q: &DMatrix<f64>, size: f64) {
-    let m = f.nrows();
-    if m == 1 {
-        x[first] *= f[(0, 0)];
-        if f[(0, 0)] != 1.0 {
-            p.row_mut(first).scale_mut(f[(0, 0)]);
-            p.column_mut(first).scale_mut(f[(0, 0)]);
-        }
-    } else {
-        let moved = f * x.rows(first, m);
-        x.rows_mut(first, m).copy_from(&moved);
-        let rows = f * p.rows(first, m);
-        p.rows_mut(first, m).copy_from(&rows);
-        let columns = p.columns(first, m) * f.transpose();
-        p.columns_mut(first, m).copy_from(&columns);
-    }
-    for j in 0..m {
-        for i in 0..m {
-            p[(first + i, first + j)] += size * q[(i, j)];
-        }
     }
 }
 

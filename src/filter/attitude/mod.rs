@@ -17,6 +17,7 @@
 //!
 //! An innovation beyond `outlier` sigma has its variance inflated until it is there.
 
+mod covariance;
 mod document;
 mod mekf;
 mod rest;

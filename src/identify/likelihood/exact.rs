@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::form::Form;
 use super::ordinates::Ordinates;
-use super::whittle::{self, Fit};
+use super::whittle;
 use crate::filter::likelihood::{LogLikelihood, Stretch, diffuse_log_likelihoods};
 use crate::model::{InitialBias, LinearModel, sensor_errors};
 use crate::noise::{Kind, NoiseModel};
@@ -13,9 +13,11 @@ use crate::units::Quantity;
 
 /// Numbers that one likelihood may cost: samples × (states² + 4 states); above, the cosine coefficients have the last word.
 const MOST_WORK: f64 = 1e8;
-/// Steps of the search at most; it ends when another would gain less than half of this in ln L: 3e-5 standard deviations from the maximum.
-const STEPS: usize = 12;
+/// Steps of the search at most, from far away most of them; it ends when another would gain less than half of this in ln L: 3e-5 standard deviations from the maximum.
+const STEPS: usize = 40;
 const ENOUGH: f64 = 1e-9;
+/// Twice the gain in ln L of a step from a place that is still far away: the curvature there is not that of the maximum.
+const FAR: f64 = 100.0;
 /// Step of numerical derivatives in standard deviations: small enough that third derivatives of order one leave 2e-5 of a standard deviation.
 const STEP: f64 = 0.01;
 /// Rounding of ln L, relative: a sum of many terms.
@@ -52,9 +54,14 @@ pub(super) struct Exact<'a> {
 
 impl<'a> Exact<'a> {
     /// `None` where it would take too long, or there is nothing but the slope of a ramp to be found.
-    pub(super) fn new(data: &'a Ordinates, fit: &'a Fit, logs: &'a [Vec<Stretch<'a>>]) -> Option<Exact<'a>> {
-        let exact = Exact { data, form: &fit.form, logs };
-        let states = exact.model(&fit.logs)?.states.len() as f64;
+    pub(super) fn new(
+        data: &'a Ordinates,
+        form: &'a Form,
+        start: &[f64],
+        logs: &'a [Vec<Stretch<'a>>],
+    ) -> Option<Exact<'a>> {
+        let exact = Exact { data, form, logs };
+        let states = exact.model(start)?.states.len() as f64;
         (exact.samples() as f64 * (states * states + 4.0 * states) < MOST_WORK).then_some(exact)
     }
 
@@ -108,28 +115,33 @@ impl<'a> Exact<'a> {
 
     /// From the maximum on the cosine coefficients, by a quasi-Newton method that begins with their information: it is nearly that of the exact
     /// likelihood, and what its slopes tell of the difference is added (BFGS: Broyden, Fletcher, Goldfarb, Shanno 1970).
-    pub(super) fn refine(&self, fit: &Fit) -> Option<Refined> {
-        let bounds = whittle::bounds(self.data, self.form, &fit.logs);
+    /// Far away from the maximum that information is taken anew at every place (Fisher 1925, scoring).
+    pub(super) fn refine(&self, start: &[f64], bounds: &[(f64, f64)]) -> Option<Refined> {
         let more = self.samples() as f64 / self.data.samples as f64;
-        let mut curvature = whittle::expected_information(self.data, self.form, &fit.logs) * more;
-        let sigmas: Vec<f64> = curvature.diagonal().iter().map(|v| 1.0 / v.sqrt()).collect();
-        let mut here = self.look(fit.logs.clone(), &bounds, &sigmas)?;
+        let expected = |at: &[f64]| whittle::expected_information(self.data, self.form, at) * more;
+        let mut curvature = expected(start);
+        let mut sigmas: Vec<f64> = curvature.diagonal().iter().map(|v| 1.0 / v.sqrt()).collect();
+        let mut here = self.look(start.to_vec(), bounds, &sigmas)?;
         for _ in 0..STEPS {
             let free = here.free.clone();
             let part = DMatrix::from_fn(free.len(), free.len(), |i, k| curvature[(free[i], free[k])]);
             let step = Cholesky::new(part)?.solve(&here.gradient);
-            if here.gradient.dot(&step) < ENOUGH {
+            let gain = here.gradient.dot(&step);
+            if gain < ENOUGH {
                 break;
             }
             let next = [1.0, 0.5, 0.25, 0.1].into_iter().find_map(|share| {
                 let shifts: Vec<(usize, f64)> = free.iter().zip(step.iter()).map(|(i, s)| (*i, share * s)).collect();
                 let mut next = moved(&here.at, &shifts);
-                next.iter_mut().zip(&bounds).for_each(|(v, (low, high))| *v = v.clamp(*low, *high));
-                let place = self.look(next, &bounds, &sigmas)?;
+                next.iter_mut().zip(bounds).for_each(|(v, (low, high))| *v = v.clamp(*low, *high));
+                let place = self.look(next, bounds, &sigmas)?;
                 (place.value > here.value - ROUNDING * here.value.abs()).then_some(place)
             });
             let Some(next) = next else { break };
-            if next.free == free {
+            if gain > FAR {
+                curvature = expected(&next.at);
+                sigmas = curvature.diagonal().iter().map(|v| 1.0 / v.sqrt()).collect();
+            } else if next.free == free {
                 learn(&mut curvature, &here, &next);
             }
             here = next;

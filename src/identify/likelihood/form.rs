@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::super::shape::{Role, roles};
-use crate::noise::{Kind, Term};
+use crate::noise::{Kind, NoiseModel, Term};
 
 /// One process of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -89,6 +89,14 @@ impl Form {
     pub(super) fn new(mut pieces: Vec<Piece>) -> Form {
         pieces.sort_unstable();
         Form { pieces }
+    }
+
+    /// Of a model, with its logarithms; the slope of a ramp is none of them.
+    pub(super) fn of(model: &NoiseModel) -> (Form, Vec<f64>) {
+        let mut pieces: Vec<(Piece, Vec<f64>)> = model.terms.iter().map(Piece::of).collect();
+        pieces.sort_by_key(|(piece, _)| *piece);
+        let logs = pieces.iter().flat_map(|(_, values)| values.iter().map(|v| v.ln())).collect();
+        (Form::new(pieces.into_iter().map(|(piece, _)| piece).collect()), logs)
     }
 
     pub(super) fn pieces(&self) -> &[Piece] {

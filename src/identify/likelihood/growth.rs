@@ -272,10 +272,10 @@ impl<'a> Residual<'a> {
                     continue;
                 }
                 let power: f64 = window.iter().zip(s).map(|(bin, s)| bin.power - s * bin.count).sum();
-                let variance = power / self.data.span_s();
+                let variance = power / self.data.total_s();
                 let middle = window.iter().map(|bin| bin.frequency_hz * bin.power).sum::<f64>()
                     / window.iter().map(|bin| bin.power).sum::<f64>();
-                let width = count / (2.0 * self.data.span_s());
+                let width = count / (2.0 * self.data.total_s());
                 let time = (1.0 / (std::f64::consts::PI * width)).min(self.data.span_s());
                 found.push((z, [0.5 * variance.max(1e-300).ln(), middle.ln(), time.ln()]));
             }

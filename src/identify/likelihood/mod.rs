@@ -14,6 +14,7 @@ pub(super) mod sums;
 pub mod temperature;
 mod turn_on;
 mod whittle;
+pub mod windows;
 
 use rayon::prelude::*;
 
@@ -21,15 +22,17 @@ use super::selection::FIT_LEVEL;
 use super::shape::Role;
 use super::shape::document_name;
 use super::{
-    Candidate, Identified, IdentifyError, LENGTHS_TO_TELL, ModelChoice, Precision as Known, WIDEST_INTERVAL, bias,
-    entry, usable,
+    Candidate, FEWEST_SAMPLES, Identified, IdentifyError, LENGTHS_TO_TELL, ModelChoice, Precision as Known,
+    WIDEST_INTERVAL, bias, entry, usable,
 };
-use crate::allan::{self, Deviation, TauGrid};
+use crate::allan::{self, AllanCurve, Deviation, TauGrid};
 use crate::consistency::spectrum::departure;
 use crate::filter::likelihood::Stretch;
-use crate::noise::{Kind, NoiseModel, Term};
+use crate::noise::{Grid, Kind, NoiseModel, Term};
 use crate::numerics::distribution::NORMAL_95;
+use crate::numerics::reduce::mean;
 use crate::params::{AxisParams, NotIdentified};
+use crate::signal::lines::Line;
 use crate::units::{Unit, digits};
 use exact::{Exact, Refined};
 use form::{Form, Piece};
@@ -52,6 +55,8 @@ const FAST: f64 = 10.0;
 const HELD_OUT: usize = 6;
 /// Standard deviation of a logarithm below which second differences of the exact likelihood give its interval.
 const PARABOLA: f64 = 0.3;
+/// Longest correlation time that a maximum is looked for at, in lengths of the log.
+const FURTHEST: f64 = 100.0;
 /// Share of the log to which the candidates are fitted for that.
 const FITTED_SHARE: f64 = 2.0 / 3.0;
 
@@ -66,78 +71,104 @@ pub(super) fn identify(
 ) -> Result<Identified, IdentifyError> {
     usable(name, rate)?;
     let failed = |message: String| IdentifyError { message: format!("{name}: {message}") };
-    let (curve, found) = rayon::join(
-        || allan::curve(rate, dt, Deviation::Oadev, TauGrid::Log(POINTS_PER_DECADE)),
-        || search(rate, logs, dt, choice),
-    );
-    let mut curve = curve.map_err(|e| failed(e.to_string()))?;
-    let forced = *choice != ModelChoice::Auto;
-    let Candidates { data, fits, held_out, chosen, refined } = found;
-    let (Some((on_cosines, _)), Some((fitted, refined))) = (fits.get(chosen), refined) else {
-        let line = matches!(choice, ModelChoice::Terms(kinds) if kinds.contains(&Kind::Oscillation));
-        return Err(failed(if line {
-            "no line stands out of the spectrum: leave osc out of --model".into()
-        } else {
-            format!("{} samples say nothing about any noise term; use a longer log", rate.len())
-        }));
+    let search = || {
+        let data = Ordinates::new(rate, dt, None);
+        let lines = data.lines.clone();
+        choose(data, choice, &|| Some(thirds(rate, dt, &lines)), logs)
     };
+    let (curve, found) =
+        rayon::join(|| allan::curve(rate, dt, Deviation::Oadev, TauGrid::Log(POINTS_PER_DECADE)), search);
+    let curve = curve.map_err(|e| failed(e.to_string()))?;
+    Whole { name, samples: rate.len(), level: mean(rate), dt, display, choice }.identified(found, curve)
+}
 
-    let Fitted { fit, known } = &fitted;
-    let words = Words { data: &data, display };
-    let terms = known_terms(&data, fit, known);
-    let all_known = terms.len() == fit.form.pieces().len();
-    let model = NoiseModel { terms: terms.iter().map(|found| found.term).collect() };
-    curve.refine(&model);
-    let mut not_identified = words.unknown_parameters(fit, known);
-    if !forced {
-        if let Some((best, of_best)) = fits.first().filter(|_| chosen > 0) {
-            not_identified.extend(words.unknown_parameters(best, of_best));
+/// What is said of the log as a whole.
+struct Whole<'a> {
+    name: &'a str,
+    samples: usize,
+    /// Their mean.
+    level: f64,
+    dt: f64,
+    display: &'a Unit,
+    choice: &'a ModelChoice,
+}
+
+impl Whole<'_> {
+    /// The chosen candidate in words and numbers.
+    fn identified(&self, found: Candidates, mut curve: AllanCurve) -> Result<Identified, IdentifyError> {
+        let &Whole { name, samples, level, dt, display, choice } = self;
+        let failed = |message: String| IdentifyError { message: format!("{name}: {message}") };
+        let forced = *choice != ModelChoice::Auto;
+        let Candidates { data, fits, held_out, chosen, refined } = found;
+        let (Some((on_cosines, _)), Some((fitted, refined))) = (fits.get(chosen), refined) else {
+            let line = matches!(choice, ModelChoice::Terms(kinds) if kinds.contains(&Kind::Oscillation));
+            return Err(failed(if line {
+                "no line stands out of the spectrum: leave osc out of --model".into()
+            } else {
+                format!("{samples} samples say nothing about any noise term; use a longer log")
+            }));
+        };
+
+        let Fitted { fit, known } = &fitted;
+        let words = Words { data: &data, display };
+        let terms = known_terms(&data, fit, known);
+        let all_known = terms.len() == fit.form.pieces().len();
+        let model = NoiseModel { terms: terms.iter().map(|found| found.term).collect() };
+        curve.refine(&model);
+        let mut not_identified = words.unknown_parameters(fit, known);
+        if !forced {
+            if let Some((best, of_best)) = fits.first().filter(|_| chosen > 0) {
+                not_identified.extend(words.unknown_parameters(best, of_best));
+            }
+            not_identified.extend(words.look_alikes(&fits, chosen));
+            not_identified.extend(words.no_drift(fit));
         }
-        not_identified.extend(words.look_alikes(&fits, chosen));
-        not_identified.extend(words.no_drift(fit));
+        let sums = sums::sums(&data, fit, refined.as_ref().and_then(|refined| refined.information.as_ref()));
+        let fit_p_value = goodness(&data, fit);
+        let candidate = |(i, (fit, known)): (usize, &(Fit, Vec<Precision>))| Candidate {
+            model: fit.form.label(),
+            parameters: fit.form.parameters(),
+            chi_square: None,
+            dof: None,
+            log_likelihood: Some(fit.log_likelihood),
+            held_out: held_out.get(i).copied().flatten(),
+            score: score(fit, &data),
+            identified: unknown(&data, fit, known).is_empty(),
+            chosen: i == chosen,
+        };
+        let candidates = fits.iter().enumerate().map(candidate).collect();
+        let (bias, turn_on_bias) = match refined.as_ref().and_then(|refined| turn_on::spread(&refined.biases)) {
+            Some(spread) => spread.measured(display),
+            None => (bias(level, samples, dt, &model, display), None),
+        };
+        Ok(Identified {
+            params: AxisParams {
+                name: name.into(),
+                bias: Some(bias),
+                turn_on_bias,
+                temperature: None,
+                terms: terms
+                    .iter()
+                    .map(|found| entry(&found.term, &found.intervals, display))
+                    .collect::<Result<_, _>>()?,
+                not_identified: not_identified.clone(),
+            },
+            precision: known_precision(&terms),
+            time_profile: shared::TimeProfile::new(&data, on_cosines),
+            fitted: Some(fitted.clone()),
+            sums,
+            // of the parameters that are written, not of others
+            exact_log_likelihood: refined.filter(|_| all_known).map(|refined| refined.log_likelihood),
+            warnings: words.warnings(fit, fit_p_value),
+            model,
+            candidates,
+            not_identified,
+            steps: vec![],
+            fit_p_value,
+            first_tau_s: None,
+            curve,
+        })
     }
-    let sums = sums::sums(&data, fit, refined.as_ref().and_then(|refined| refined.information.as_ref()));
-    let fit_p_value = goodness(&data, fit);
-    let candidate = |(i, (fit, known)): (usize, &(Fit, Vec<Precision>))| Candidate {
-        model: fit.form.label(),
-        parameters: fit.form.parameters(),
-        chi_square: None,
-        dof: None,
-        log_likelihood: Some(fit.log_likelihood),
-        held_out: held_out.get(i).copied().flatten(),
-        score: score(fit, &data),
-        identified: unknown(&data, fit, known).is_empty(),
-        chosen: i == chosen,
-    };
-    let candidates = fits.iter().enumerate().map(candidate).collect();
-    let (bias, turn_on_bias) = match refined.as_ref().and_then(|refined| turn_on::spread(&refined.biases)) {
-        Some(spread) => spread.measured(display),
-        None => (bias(rate, dt, &model, display), None),
-    };
-    Ok(Identified {
-        params: AxisParams {
-            name: name.into(),
-            bias: Some(bias),
-            turn_on_bias,
-            temperature: None,
-            terms: terms.iter().map(|found| entry(&found.term, &found.intervals, display)).collect::<Result<_, _>>()?,
-            not_identified: not_identified.clone(),
-        },
-        precision: known_precision(&terms),
-        time_profile: shared::TimeProfile::new(&data, on_cosines),
-        fitted: Some(fitted.clone()),
-        sums,
-        // of the parameters that are written, not of others
-        exact_log_likelihood: refined.filter(|_| all_known).map(|refined| refined.log_likelihood),
-        warnings: words.warnings(fit, fit_p_value),
-        model,
-        candidates,
-        not_identified,
-        steps: vec![],
-        fit_p_value,
-        first_tau_s: None,
-        curve,
-    })
 }
 
 /// Candidates and the one that was chosen.
@@ -151,15 +182,23 @@ struct Candidates {
     refined: Option<(Fitted, Option<Refined>)>,
 }
 
-fn search(rate: &[f64], logs: &[Vec<Stretch<'_>>], dt: f64, choice: &ModelChoice) -> Candidates {
-    let data = Ordinates::new(rate, dt, None);
+/// `parts`: the log in an earlier and a later part, where it can be cut; `logs`: for the exact likelihood, if that is to have the last word.
+fn choose(
+    data: Ordinates,
+    choice: &ModelChoice,
+    parts: &(dyn Fn() -> Option<[Ordinates; 2]> + Sync),
+    logs: &[Vec<Stretch<'_>>],
+) -> Candidates {
     let refined = |fits: &[(Fit, Vec<Precision>)], chosen: usize| {
         fits.get(chosen).map(|(fit, known)| refine(&data, fit, known, fit, logs))
     };
+    let held_out = |parts: Option<[Ordinates; 2]>, fits: &[(Fit, Vec<Precision>)]| {
+        parts.map_or_else(|| vec![None; fits.len()], |parts| held_out(&parts, fits))
+    };
     match choice {
         ModelChoice::Auto => {
-            let (fits, thirds) = rayon::join(|| fits(&data, choice), || thirds(rate, &data));
-            let held_out = held_out(&thirds, &fits);
+            let (fits, parts) = rayon::join(|| fits(&data, choice), parts);
+            let held_out = held_out(parts, &fits);
             let chosen = choice_of(&data, &fits, &held_out);
             let refined = refined(&fits, chosen);
             Candidates { data, fits, held_out, chosen, refined }
@@ -167,7 +206,7 @@ fn search(rate: &[f64], logs: &[Vec<Stretch<'_>>], dt: f64, choice: &ModelChoice
         // what is held out chooses nothing
         ModelChoice::Terms(_) => {
             let fits = fits(&data, choice);
-            let (refined, held_out) = rayon::join(|| refined(&fits, 0), || held_out(&thirds(rate, &data), &fits));
+            let (refined, held_out) = rayon::join(|| refined(&fits, 0), || held_out(parts(), &fits));
             Candidates { data, fits, held_out, chosen: 0, refined }
         }
     }
@@ -198,7 +237,8 @@ pub struct Fitted {
     known: Vec<Precision>,
 }
 
-/// From the maximum on the cosine coefficients to that of the exact likelihood of all logs, where it can be had; searched from `start`.
+/// From the maximum on the cosine coefficients to that of the exact likelihood of all logs, where there are any and it can be had; searched
+/// from `start`.
 fn refine(
     data: &Ordinates,
     on_cosines: &Fit,
@@ -206,7 +246,9 @@ fn refine(
     start: &Fit,
     logs: &[Vec<Stretch<'_>>],
 ) -> (Fitted, Option<Refined>) {
-    let refined = Exact::new(data, start, logs).and_then(|exact| exact.refine(start));
+    let bounds = whittle::bounds(data, &start.form, &start.logs);
+    let exact = Exact::new(data, &start.form, &start.logs, logs).filter(|_| !logs.is_empty());
+    let refined = exact.and_then(|exact| exact.refine(&start.logs, &bounds));
     let fitted = match &refined {
         Some(refined) => Fitted {
             fit: Fit { logs: refined.logs.clone(), ..on_cosines.clone() },
@@ -215,6 +257,33 @@ fn refine(
         None => Fitted { fit: on_cosines.clone(), known: known.to_vec() },
     };
     (fitted, refined)
+}
+
+/// The terms of `start` at the maximum of the exact likelihood of all logs, nothing else: no choice of terms, no intervals. With it diffuse
+/// ln L, SI; `start` may be far away, if every parameter is within about a factor of ten or twenty.
+///
+/// `None` for a model with flicker noise or a ramp, a likelihood that would take minutes, and a start from which no step leads up.
+pub fn maximum(start: &NoiseModel, logs: &[Vec<Stretch<'_>>], dt: f64) -> Option<(NoiseModel, f64)> {
+    let (form, at) = Form::of(start);
+    let samples = logs.iter().flatten().map(|part| part.samples.len()).max()?;
+    if form.has(Kind::RateRamp) || form.has(Kind::BiasInstability) || samples < FEWEST_SAMPLES {
+        return None;
+    }
+    let data = Ordinates::expected(samples, dt, &[], |frequency_hz| Grid::new(frequency_hz.to_vec(), dt));
+    let longest = (FURTHEST * data.span_s()).ln();
+    let bounds: Vec<(f64, f64)> = form
+        .roles()
+        .iter()
+        .map(|(_, role)| match role {
+            Role::CorrelationTime => (dt.ln(), longest),
+            Role::Frequency => (f64::NEG_INFINITY, (0.5 / dt).ln()),
+            Role::Coefficient => (f64::NEG_INFINITY, f64::INFINITY),
+        })
+        .collect();
+    let found = Exact::new(&data, &form, &at, logs)?.refine(&at, &bounds)?;
+    let values = |own: &[f64]| own.iter().map(|v| v.exp()).collect::<Vec<f64>>();
+    let terms = form.split(&found.logs).filter_map(|(piece, own)| piece.term(&values(own))).collect();
+    Some((NoiseModel { terms }, found.log_likelihood))
 }
 
 /// What is known of each logarithm at the maximum of the exact likelihood: intervals of what is known well move along, and shrink where there was
@@ -422,9 +491,9 @@ fn choice_of(data: &Ordinates, fits: &[(Fit, Vec<Precision>)], held_out: &[Optio
 }
 
 /// The first two thirds of the log, and the last.
-fn thirds(rate: &[f64], data: &Ordinates) -> [Ordinates; 2] {
+fn thirds(rate: &[f64], dt: f64, lines: &[Line]) -> [Ordinates; 2] {
     let (early, late) = rate.split_at((rate.len() as f64 * FITTED_SHARE) as usize);
-    [early, late].map(|part| Ordinates::new(part, data.dt, Some(&data.lines)))
+    [early, late].map(|part| Ordinates::new(part, dt, Some(lines)))
 }
 
 /// ln L of the last third of the log under the parameters that the first two thirds give, by candidate.
@@ -455,7 +524,7 @@ impl Words<'_> {
     }
 
     fn not_identified(&self, fit: &Fit, index: usize, known: &Precision) -> NotIdentified {
-        let span = digits(self.data.span_s());
+        let span = digits(self.data.total_s());
         let value = |log: f64| self.shown(fit, index, log);
         let reason = match (known.lower, known.upper) {
             (Some(low), None) => format!("above {} (97.5 %); the {span} s log sets no upper limit", value(low)),
@@ -464,11 +533,11 @@ impl Words<'_> {
             (None, None) => format!("the {span} s log bounds it on no side"),
         };
         // widths shrink like T^(−1/2)
-        let needed = self.data.span_s() * (2.0 * NORMAL_95 * known.bound / WIDEST_INTERVAL.ln()).powi(2);
+        let needed = self.data.total_s() * (2.0 * NORMAL_95 * known.bound / WIDEST_INTERVAL.ln()).powi(2);
         NotIdentified {
             term: name_of(&fit.form, index),
             reason: format!("{reason}, model {}", fit.form.label()),
-            needed_log_s: (needed.is_finite() && needed > self.data.span_s()).then_some(needed),
+            needed_log_s: (needed.is_finite() && needed > self.data.total_s()).then_some(needed),
         }
     }
 
@@ -511,7 +580,7 @@ impl Words<'_> {
                     fit.form.label(),
                     own.form.label(),
                 ),
-                needed_log_s: estimate.map(|time| (LENGTHS_TO_TELL * time).max(2.0 * self.data.span_s())),
+                needed_log_s: estimate.map(|time| (LENGTHS_TO_TELL * time).max(2.0 * self.data.total_s())),
             });
         }
         found
@@ -529,7 +598,7 @@ impl Words<'_> {
         });
         vec![NotIdentified {
             term: document_name(Kind::RateRandomWalk).into(),
-            reason: format!("no drift is seen above the white noise in {} s{limit}", digits(self.data.span_s())),
+            reason: format!("no drift is seen above the white noise in {} s{limit}", digits(self.data.total_s())),
             needed_log_s: None,
         }]
     }

@@ -41,7 +41,9 @@ pub(super) struct Ordinates {
     /// Their frequencies.
     pub(super) grid: Grid,
     pub(super) lines: Vec<Line>,
+    /// Of the log, or of each of its windows.
     pub(super) samples: usize,
+    pub(super) windows: usize,
     /// s.
     pub(super) dt: f64,
 }
@@ -77,7 +79,21 @@ impl Ordinates {
         };
         let bins: Vec<Bin> = layout(coefficients.len(), step, &lines).into_par_iter().map(bin).collect();
         let grid = Grid::new(bins.iter().map(|bin: &Bin| bin.frequency_hz).collect(), dt);
-        Ordinates { bins, grid, lines, samples: n, dt }
+        Ordinates { bins, grid, lines, samples: n, windows: 1, dt }
+    }
+
+    /// Windows of the same length and lines taken together; `None` of none.
+    pub(super) fn pooled(windows: &[Ordinates]) -> Option<Ordinates> {
+        let (first, others) = windows.split_first()?;
+        let mut all = Ordinates { windows: windows.len(), ..first.clone() };
+        for (bin, own) in others.iter().flat_map(|window| (0..).zip(&window.bins)) {
+            let bin: &mut Bin = &mut all.bins[bin];
+            bin.count += own.count;
+            bin.power += own.power;
+            bin.with_ramp += own.with_ramp;
+            bin.ramp += own.ramp;
+        }
+        Some(all)
     }
 
     /// What a log of so many samples would have before it is recorded: bins without power. `grid` is made of their frequencies.
@@ -93,7 +109,7 @@ impl Ordinates {
         };
         let bins: Vec<Bin> = layout(samples.saturating_sub(1), step, lines).into_iter().map(bin).collect();
         let grid = grid(&bins.iter().map(|bin| bin.frequency_hz).collect::<Vec<f64>>());
-        Ordinates { bins, grid, lines: lines.to_vec(), samples, dt }
+        Ordinates { bins, grid, lines: lines.to_vec(), samples, windows: 1, dt }
     }
 
     /// Around a frequency: where bins are at most twice as wide as there, and how wide they are there, Hz.
@@ -104,12 +120,17 @@ impl Ordinates {
         let first = (0..at).rev().take_while(|i| self.bins[*i].count <= most).last().unwrap_or(at);
         let last = (at..self.bins.len()).take_while(|i| self.bins[*i].count <= most).last().unwrap_or(at);
         let (low, high) = (self.bins[first].frequency_hz, self.bins[last].frequency_hz);
-        (low.min(frequency_hz), high.max(frequency_hz), self.bins[at].count * step)
+        (low.min(frequency_hz), high.max(frequency_hz), self.bins[at].count / self.windows as f64 * step)
     }
 
-    /// Length of the log, s.
+    /// Length of the log, or of each of its windows, s.
     pub(super) fn span_s(&self) -> f64 {
         self.samples as f64 * self.dt
+    }
+
+    /// Length of all windows, s.
+    pub(super) fn total_s(&self) -> f64 {
+        self.windows as f64 * self.span_s()
     }
 }
 

@@ -96,8 +96,8 @@ impl Planned {
                 _ => {}
             }
         }
-        let logs = pieces.iter().flat_map(|(_, values, _)| values.iter().map(|v| v.ln())).collect();
-        Planned { form: Form::new(pieces.iter().map(|(piece, _, _)| *piece).collect()), logs, parameters, lines }
+        let (form, logs) = Form::of(model);
+        Planned { form, logs, parameters, lines }
     }
 
     /// As in params.json, in its order; and `gauss_markov.driving_noise`, σ √(2/Tc).

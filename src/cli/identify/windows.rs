@@ -1,0 +1,64 @@
+//! `kfdesign identify` in windows.
+
+use anyhow::bail;
+
+use super::{Args, Axis, Log, MethodArg};
+use crate::cli::allan::AxisCurve;
+use crate::cli::stretch;
+use crate::cli::windows::{Windows, note};
+use crate::identify::ModelChoice;
+use crate::identify::windows::Windows as Likelihoods;
+use crate::input::LogOptions;
+
+/// The axes in windows, if `--window` or the size of the file asks for it.
+pub(super) fn axes(
+    args: &Args,
+    choice: &ModelChoice,
+    options: &LogOptions,
+) -> anyhow::Result<Option<(Log, Vec<Axis>)>> {
+    let other = match () {
+        () if args.method != MethodArg::Likelihood => Some("--method likelihood"),
+        () if args.logs.len() > 1 => Some("one log"),
+        () if args.robust => Some("a log without --robust"),
+        () if args.temperature.as_deref().is_some_and(|column| column.trim() != "none") => {
+            Some("a log without --temperature")
+        }
+        () => None,
+    };
+    if let Some(other) = other {
+        if let Some(window) = &args.window {
+            bail!("--window {window}: only {other} is identified in windows");
+        }
+        return Ok(None);
+    }
+    let Some(windows) = Windows::open(&args.logs[0], args.window.as_deref(), options)? else { return Ok(None) };
+    let (samples, dt, axes, length) = (windows.samples, windows.dt, windows.axes(), windows.length());
+    let log = Log {
+        name: windows.name.clone(),
+        quantity: windows.quantity(),
+        sample_rate_hz: windows.check.sample_rate_hz,
+        sha256: Some(windows.sha256().to_string()),
+        checks: vec![windows.check.clone()],
+    };
+    let mut likelihoods: Vec<Likelihoods> =
+        axes.iter().map(|(name, unit)| Likelihoods::new(name, samples, dt, unit)).collect();
+    let left_out =
+        windows.read(|axis, values| Ok(likelihoods[axis].add(&stretch::rate(values, options.kind, dt))?))?;
+    let mut found = Vec::with_capacity(axes.len());
+    for (((name, unit), likelihood), left_out) in axes.into_iter().zip(likelihoods).zip(left_out) {
+        let count = likelihood.len();
+        let said = note(&name, count as u64, &length, left_out, "whose likelihoods are multiplied")?;
+        let mut identified = likelihood.identify(choice)?;
+        identified.warnings.push(format!("{said}; outliers and steps were not looked for"));
+        log.warn_of_motion(&name, &mut identified);
+        let (curve, fit) = (identified.curve.clone(), Ok(identified.model.clone()));
+        found.push(Axis {
+            measured: AxisCurve { name, unit, note: None, curve, fit },
+            samples: count * samples,
+            left_out: left_out as usize,
+            found: identified,
+            warmth: None,
+        });
+    }
+    Ok(Some((log, found)))
+}

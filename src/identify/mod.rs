@@ -10,7 +10,8 @@ mod selection;
 mod shape;
 mod weighted_fit;
 
-pub use likelihood::{Fitted, maximum, plan, temperature, windows};
+pub use likelihood::maximum::maximum;
+pub use likelihood::{Fitted, plan, temperature, windows};
 use schemars::JsonSchema;
 use serde::Serialize;
 

@@ -3,14 +3,15 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::course::{AxisCourse, Channel};
 use super::engine::Course;
 use super::lanes::{Aligned, CHUNK, ChannelSums, LANES, Lane, Scratch};
 use crate::filter::Kalman;
+use crate::filter::judge::Judge;
 use crate::numerics::distribution::chi_square_quantile;
+use crate::numerics::linalg::cholesky_in_place;
 
 /// Runs whose sums are taken one after the other; sums of such blocks are added in order, so that threads leave no trace.
 const BLOCK: u64 = 64;
@@ -73,16 +74,45 @@ fn whitening(axis: &AxisCourse) -> Arc<[f64]> {
     }
     let mut whiten = vec![0.0; axis.gains.steps as usize * components * (n + m)];
     let steps = covariances.par_chunks_exact(n * n).zip(whiten.par_chunks_exact_mut(components * (n + m)));
-    steps.with_min_len(CHUNK).for_each(|(covariance, whiten)| {
-        let root = axis.judge.whitening(&DMatrix::from_column_slice(n, n, covariance));
-        let root = root.unwrap_or(DMatrix::from_element(components, components, f64::NAN));
-        let (of_truth, of_estimate) = whiten.split_at_mut(components * m);
-        for (part, whiten) in [(&root * &axis.judge.of_truth, of_truth), (root * &axis.judge.of_estimate, of_estimate)]
-        {
-            whiten.copy_from_slice(part.transpose().as_slice());
-        }
-    });
+    steps.with_min_len(CHUNK).for_each_init(
+        || (vec![0.0; components * n], vec![0.0; components * components]),
+        |(product, root), (covariance, whiten)| {
+            whitening_at(&axis.judge, n, covariance, product, root, whiten);
+        },
+    );
     whiten.into()
+}
+
+/// L⁻¹ A, then L⁻¹ B, by rows, with L Lᵀ = B P Bᵀ; NaN where that is singular. P by columns; `product` and `root` are scratch of
+/// c n and c² numbers for c components.
+fn whitening_at(judge: &Judge, n: usize, p: &[f64], product: &mut [f64], root: &mut [f64], whiten: &mut [f64]) {
+    let (c, a, b) = (judge.size(), judge.of_truth.as_slice(), judge.of_estimate.as_slice());
+    // B P, then B P Bᵀ, by columns
+    for (j, column) in product.chunks_exact_mut(c).enumerate() {
+        for (i, value) in column.iter_mut().enumerate() {
+            *value = (0..n).map(|k| b[i + c * k] * p[k + n * j]).sum();
+        }
+    }
+    for (j, column) in root.chunks_exact_mut(c).enumerate() {
+        for (i, value) in column.iter_mut().enumerate() {
+            *value = (0..n).map(|k| product[i + c * k] * b[j + c * k]).sum();
+        }
+    }
+    if cholesky_in_place(root, c).is_err() {
+        whiten.fill(f64::NAN);
+        return;
+    }
+    let (of_truth, of_estimate) = whiten.split_at_mut(a.len());
+    for (of, whiten) in [(a, of_truth), (b, of_estimate)] {
+        let wide = of.len() / c;
+        for i in 0..c {
+            let (above, row) = whiten.split_at_mut(i * wide);
+            for (j, value) in row[..wide].iter_mut().enumerate() {
+                let rest: f64 = (0..i).map(|k| root[i + c * k] * above[k * wide + j]).sum();
+                *value = (of[i + c * j] - rest) / root[i + c * i];
+            }
+        }
+    }
 }
 
 impl Judged {

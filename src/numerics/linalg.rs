@@ -34,18 +34,25 @@ fn complement(a: &DMatrix<f64>, l: &DMatrix<f64>, i: usize, j: usize) -> f64 {
 pub fn cholesky(a: &DMatrix<f64>) -> Result<DMatrix<f64>, LinalgError> {
     let n = a.nrows();
     require_shape(a, n, n)?;
-    let mut l = DMatrix::zeros(n, n);
+    let mut l = a.clone();
+    l.fill_upper_triangle(0.0, 1);
+    cholesky_in_place(l.as_mut_slice(), n)?;
+    Ok(l)
+}
+
+/// The same by columns of `n` numbers, in place; what is above the diagonal is neither read nor changed.
+pub fn cholesky_in_place(a: &mut [f64], n: usize) -> Result<(), LinalgError> {
     for j in 0..n {
-        let pivot = complement(a, &l, j, j);
-        if !(pivot > 0.0 && pivot.is_finite()) {
-            return Err(LinalgError::NotPositiveDefinite { pivot: j, value: pivot });
-        }
-        l[(j, j)] = pivot.sqrt();
-        for i in j + 1..n {
-            l[(i, j)] = complement(a, &l, i, j) / l[(j, j)];
+        for i in j..n {
+            // Schur complement a_ij − Σ_{k<j} l_ik l_jk
+            let value = a[i + n * j] - (0..j).map(|k| a[i + n * k] * a[j + n * k]).sum::<f64>();
+            if i == j && !(value > 0.0 && value.is_finite()) {
+                return Err(LinalgError::NotPositiveDefinite { pivot: j, value });
+            }
+            a[i + n * j] = if i == j { value.sqrt() } else { value / a[j + n * j] };
         }
     }
-    Ok(l)
+    Ok(())
 }
 
 /// Lower factor L of a positive *semi*definite matrix, A = L Lᵀ, with a zero column where A has no new direction.

@@ -52,23 +52,24 @@ fn four_times_the_same_windows() {
     assert!((gain(&often) / gain(&once) - 4.0).abs() < 1e-9);
 }
 
-/// 200 logs of ten windows, each ten correlation times long: N, sigma and Tc are off by as much as is said. Mean within 4 standard deviations of
-/// the mean of 200 (and a hundredth, the bias of a logarithm), mean square of (ln θ̂ − ln θ)/σ within 4 × √(2/200) of 1: six figures, false alarms 4e-4.
+/// 60 logs of five windows, each a hundred correlation times long: N, sigma and Tc are off by as much as is said. Mean within 4 standard deviations
+/// of the mean of 60 and 0.2 (half of what the means of the windows take away of the drift), mean square of (ln θ̂ − ln θ)/σ within
+/// 4 × √(2/60) of 1: six figures, false alarms 4e-4.
 #[test]
 fn windows_recover_the_truth() {
     let mut sums = [[0.0; 2]; 3];
-    for run in 0..200 {
-        let found = in_windows(&log(&truth().terms, 20_000, DT, 29, run), 2000, 1);
+    for run in 0..60 {
+        let found = in_windows(&log(&truth().terms, 100_000, DT, 29, run), 20_000, 1);
         let precision: Vec<f64> = found.precision.iter().map(|p| p.cramer_rao_percent / 100.0).collect();
         for (i, (value, truth)) in values(&found.model).into_iter().zip(values(&truth())).enumerate() {
             let off = (value / truth).ln() / precision[i];
-            sums[i][0] += off / 200.0;
-            sums[i][1] += off * off / 200.0;
+            sums[i][0] += off / 60.0;
+            sums[i][1] += off * off / 60.0;
         }
     }
     for [mean, square] in sums {
-        assert!(mean.abs() < 4.0 / 200_f64.sqrt() + 0.1, "{sums:?}");
-        assert!((square - 1.0).abs() < 0.4, "{sums:?}");
+        assert!(mean.abs() < 4.0 / 60_f64.sqrt() + 0.2, "{sums:?}");
+        assert!((square - 1.0).abs() < 0.73, "{sums:?}");
     }
 }
 

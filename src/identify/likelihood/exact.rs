@@ -18,6 +18,8 @@ const STEPS: usize = 40;
 const ENOUGH: f64 = 1e-9;
 /// Twice the gain in ln L of a step from a place that is still far away: the curvature there is not that of the maximum.
 const FAR: f64 = 100.0;
+/// Longest step, in logarithms.
+const REACH: f64 = 1.0;
 /// Step of numerical derivatives in standard deviations: small enough that third derivatives of order one leave 2e-5 of a standard deviation.
 const STEP: f64 = 0.01;
 /// Rounding of ln L, relative: a sum of many terms.
@@ -125,8 +127,10 @@ impl<'a> Exact<'a> {
         for _ in 0..STEPS {
             let free = here.free.clone();
             let part = DMatrix::from_fn(free.len(), free.len(), |i, k| curvature[(free[i], free[k])]);
-            let step = Cholesky::new(part)?.solve(&here.gradient);
+            let mut step = Cholesky::new(part)?.solve(&here.gradient);
             let gain = here.gradient.dot(&step);
+            // far away the curvature says how steep it is there, not how far it is to the top
+            step *= (REACH / step.amax()).min(1.0);
             if gain < ENOUGH {
                 break;
             }

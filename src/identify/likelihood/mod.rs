@@ -7,6 +7,7 @@ mod exact;
 mod form;
 mod growth;
 mod interval;
+pub(super) mod maximum;
 mod ordinates;
 pub mod plan;
 pub(super) mod shared;
@@ -22,13 +23,13 @@ use super::selection::FIT_LEVEL;
 use super::shape::Role;
 use super::shape::document_name;
 use super::{
-    Candidate, FEWEST_SAMPLES, Identified, IdentifyError, LENGTHS_TO_TELL, ModelChoice, Precision as Known,
-    WIDEST_INTERVAL, bias, entry, usable,
+    Candidate, Identified, IdentifyError, LENGTHS_TO_TELL, ModelChoice, Precision as Known, WIDEST_INTERVAL, bias,
+    entry, usable,
 };
 use crate::allan::{self, AllanCurve, Deviation, TauGrid};
 use crate::consistency::spectrum::departure;
 use crate::filter::likelihood::Stretch;
-use crate::noise::{Grid, Kind, NoiseModel, Term};
+use crate::noise::{Kind, NoiseModel, Term};
 use crate::numerics::distribution::NORMAL_95;
 use crate::numerics::reduce::mean;
 use crate::params::{AxisParams, NotIdentified};
@@ -55,8 +56,6 @@ const FAST: f64 = 10.0;
 const HELD_OUT: usize = 6;
 /// Standard deviation of a logarithm below which second differences of the exact likelihood give its interval.
 const PARABOLA: f64 = 0.3;
-/// Longest correlation time that a maximum is looked for at, in lengths of the log.
-const FURTHEST: f64 = 100.0;
 /// Share of the log to which the candidates are fitted for that.
 const FITTED_SHARE: f64 = 2.0 / 3.0;
 
@@ -257,33 +256,6 @@ fn refine(
         None => Fitted { fit: on_cosines.clone(), known: known.to_vec() },
     };
     (fitted, refined)
-}
-
-/// The terms of `start` at the maximum of the exact likelihood of all logs, nothing else: no choice of terms, no intervals. With it diffuse
-/// ln L, SI; `start` may be far away, if every parameter is within about a factor of ten or twenty.
-///
-/// `None` for a model with flicker noise or a ramp, a likelihood that would take minutes, and a start from which no step leads up.
-pub fn maximum(start: &NoiseModel, logs: &[Vec<Stretch<'_>>], dt: f64) -> Option<(NoiseModel, f64)> {
-    let (form, at) = Form::of(start);
-    let samples = logs.iter().flatten().map(|part| part.samples.len()).max()?;
-    if form.has(Kind::RateRamp) || form.has(Kind::BiasInstability) || samples < FEWEST_SAMPLES {
-        return None;
-    }
-    let data = Ordinates::expected(samples, dt, &[], |frequency_hz| Grid::new(frequency_hz.to_vec(), dt));
-    let longest = (FURTHEST * data.span_s()).ln();
-    let bounds: Vec<(f64, f64)> = form
-        .roles()
-        .iter()
-        .map(|(_, role)| match role {
-            Role::CorrelationTime => (dt.ln(), longest),
-            Role::Frequency => (f64::NEG_INFINITY, (0.5 / dt).ln()),
-            Role::Coefficient => (f64::NEG_INFINITY, f64::INFINITY),
-        })
-        .collect();
-    let found = Exact::new(&data, &form, &at, logs)?.refine(&at, &bounds)?;
-    let values = |own: &[f64]| own.iter().map(|v| v.exp()).collect::<Vec<f64>>();
-    let terms = form.split(&found.logs).filter_map(|(piece, own)| piece.term(&values(own))).collect();
-    Some((NoiseModel { terms }, found.log_likelihood))
 }
 
 /// What is known of each logarithm at the maximum of the exact likelihood: intervals of what is known well move along, and shrink where there was

@@ -8,6 +8,7 @@ mod form;
 mod growth;
 mod interval;
 pub(super) mod maximum;
+mod names;
 mod ordinates;
 pub mod plan;
 pub(super) mod shared;
@@ -39,6 +40,7 @@ use exact::{Exact, Refined};
 use form::{Form, Piece};
 use growth::score;
 use interval::{Precision, precisions};
+use names::{name_of, parameter_name, term_name, unit_of};
 use ordinates::Ordinates;
 use whittle::Fit;
 
@@ -400,44 +402,6 @@ fn known_precision(terms: &[Found]) -> Vec<Known> {
         }));
     }
     all
-}
-
-/// Of a logarithm: its name in params.json.
-fn name_of(form: &Form, index: usize) -> String {
-    let (piece, role) = form.roles()[index];
-    let kind = form.pieces()[piece].kind();
-    let number = form.pieces()[..piece].iter().filter(|p| p.kind() == kind).count();
-    parameter_name(kind, number, role)
-}
-
-/// Of a logarithm: the unit of its parameter in the family of the log's unit.
-fn unit_of(form: &Form, index: usize, display: &Unit) -> Unit {
-    let (piece, role) = form.roles()[index];
-    match role {
-        Role::CorrelationTime => Unit::second(),
-        Role::Frequency => Unit::hertz(),
-        Role::Coefficient => super::coefficient_unit(form.pieces()[piece].kind(), display),
-    }
-}
-
-/// `gauss_markov[1]`.
-fn term_name(kind: Kind, number: usize) -> String {
-    if number == 0 { document_name(kind).to_string() } else { format!("{}[{number}]", document_name(kind)) }
-}
-
-/// `gauss_markov[1].std_dev`.
-fn parameter_name(kind: Kind, number: usize, role: Role) -> String {
-    let place = term_name(kind, number);
-    match role {
-        Role::CorrelationTime => format!("{place}.correlation_time"),
-        Role::Frequency => format!("{place}.frequency"),
-        Role::Coefficient => match kind {
-            Kind::GaussMarkov | Kind::Oscillation => format!("{place}.std_dev"),
-            Kind::White | Kind::MovingAverage | Kind::RateRandomWalk => format!("{place}.density"),
-            Kind::RateRamp => format!("{place}.slope"),
-            Kind::Quantization | Kind::BiasInstability => format!("{place}.coefficient"),
-        },
-    }
 }
 
 /// Probability that the cumulative spectrum of the log, divided by that of the model, departs from a straight line as it does.

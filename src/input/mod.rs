@@ -14,6 +14,7 @@ mod number;
 mod records;
 mod ros;
 mod rosbag;
+mod rows;
 mod sniff;
 mod source;
 mod sqlite;
@@ -25,10 +26,12 @@ use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
 
+use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
 use self::columns::Choice;
 use self::names::Head;
+use self::rows::{Batch, Part, Rows, WORTHWHILE};
 use crate::signal::check::{AxisRange, BackwardStamp, Checker, Finding, Outcome, TimeBase};
 use crate::signal::{Axis, Gap, LogCheck, Recording};
 use crate::units::{Dimension, Quantity, Unit};
@@ -113,25 +116,6 @@ pub struct Block {
 /// Rows a table hands out at a time.
 const BLOCK: usize = 4096;
 
-/// Rows of the selected columns as they stand in the file.
-#[derive(Debug, Default)]
-struct Rows {
-    /// Since the first stamp of the file, in the file's unit; empty without a time column.
-    time: Vec<f64>,
-    values: Vec<Vec<f64>>,
-    /// Where each row stands in the file (line or row, from 1).
-    lines: Vec<u64>,
-}
-
-impl Rows {
-    fn clear(&mut self, axes: usize) {
-        self.time.clear();
-        self.lines.clear();
-        self.values.resize_with(axes, Vec::new);
-        self.values.iter_mut().for_each(Vec::clear);
-    }
-}
-
 /// A file of columns, read from the beginning as often as needed.
 trait Table {
     fn heads(&self) -> Vec<&Head>;
@@ -149,6 +133,14 @@ trait Table {
     fn rewind(&mut self) -> Result<(), InputError>;
     /// Number of rows, where it is known to be true.
     fn rows(&self) -> Option<u64>;
+    /// So many rows, or a few more or less.
+    fn about(&self) -> Option<u64> {
+        self.rows()
+    }
+    /// Further rows cost nothing: they have been read.
+    fn at_hand(&self) -> bool {
+        false
+    }
     /// The sample rate in Hz and what the file calls it, where it says it.
     fn rate(&self) -> Option<(String, f64)> {
         None
@@ -157,12 +149,6 @@ trait Table {
     fn origin(&self) -> f64;
     /// Up to [`BLOCK`] further rows; false at the end.
     fn next_rows(&mut self, rows: &mut Rows) -> Result<bool, InputError>;
-}
-
-fn to_si(unit: &Unit, values: &mut [f64]) {
-    if unit.to_si(1.0) != 1.0 {
-        values.iter_mut().for_each(|x| *x = unit.to_si(*x));
-    }
 }
 
 /// The rows between `--start` and `--end`: from the first row at or after the start to the last before one beyond the end.
@@ -263,66 +249,111 @@ impl Log {
         if !self.table.next_rows(rows)? {
             return Ok(None);
         }
-        if let Some((column, unit)) = &self.choice.time {
-            to_si(unit, &mut rows.time);
-            if self.stamped()
-                && rows.time.iter().fold(false, |empty, t| empty | !t.is_finite())
-                && let Some(empty) = rows.time.iter().position(|t| !t.is_finite())
-            {
-                let heads = self.table.heads();
-                let head = heads[*column];
-                let table = columns::Table { heads: &heads, named: self.table.named(), place: "", rate_hz: None };
-                return Err(InputError {
-                    message: format!(
-                        "{}, column '{}': the time stamp is empty; choose another with --time{}, or give --rate HZ",
-                        self.table.row_place(rows.lines[empty]),
-                        head.full,
-                        table.other_times(*column)
-                    ),
-                });
-            }
+        match self.choice.to_si(rows, self.stamped()) {
+            Some(empty) => Err(self.empty_stamp(rows, empty)),
+            None => Ok(Some(self.wanted(selection, rows))),
         }
-        let beside = self.choice.temperature.column.as_ref().map(|(_, info)| &info.unit);
-        let units = self.choice.axes.iter().map(|axis| &axis.unit).chain(&self.choice.extra).chain(beside);
-        for (column, unit) in rows.values.iter_mut().zip(units) {
-            to_si(unit, column);
-        }
+    }
+
+    fn wanted(&self, selection: &mut Selection, rows: &Rows) -> (Range<usize>, bool) {
         let stamped = self.stamped();
         let rate = self.options.rate_hz.unwrap_or(f64::NAN);
         let time = |i: usize, row: u64| if stamped { rows.time[i] } else { row as f64 / rate };
-        Ok(Some(selection.take(rows.lines.len(), time)))
+        selection.take(rows.lines.len(), time)
     }
 
-    /// The checking pass; `keep` is handed every wanted row. Rows are checked and kept while the next ones are read.
-    fn scan(&mut self, mut keep: impl FnMut(&Rows, Range<usize>) + Send) -> Result<Scan, InputError> {
+    fn empty_stamp(&self, rows: &Rows, empty: usize) -> InputError {
+        let heads = self.table.heads();
+        let column = self.choice.time.as_ref().map_or(0, |(column, _)| *column);
+        let table = columns::Table { heads: &heads, named: self.table.named(), place: "", rate_hz: None };
+        InputError {
+            message: format!(
+                "{}, column '{}': the time stamp is empty; choose another with --time{}, or give --rate HZ",
+                self.table.row_place(rows.line(empty)),
+                heads[column].full,
+                table.other_times(column)
+            ),
+        }
+    }
+
+    /// The next parts: read, and then made ready on all threads.
+    fn gather(&mut self, selection: &mut Selection, batch: &mut Batch) {
+        // nothing is read far behind the end that was asked for
+        let one = self.options.end_s.is_some();
+        (batch.count, batch.last, batch.fault) = (0, false, None);
+        let mut read = 0;
+        while !batch.last && (batch.count == 0 || !one && (read < WORTHWHILE || self.table.at_hand())) {
+            batch.parts.resize_with(batch.parts.len().max(batch.count + 1), Part::default);
+            let rows = &mut batch.parts[batch.count].rows;
+            match self.table.next_rows(rows) {
+                Ok(true) => (batch.count, read) = (batch.count + 1, read + rows.lines.len()),
+                Ok(false) => batch.last = true,
+                Err(fault) => (batch.last, batch.fault) = (true, Some(fault)),
+            }
+        }
+        let (choice, stamped) = (&self.choice, self.stamped());
+        let ready = batch.parts[..batch.count].par_iter_mut().map(|part| choice.to_si(&mut part.rows, stamped));
+        let empty: Vec<Option<usize>> = ready.collect();
+        for (i, empty) in empty.into_iter().enumerate() {
+            let part = &mut batch.parts[i];
+            if let Some(empty) = empty {
+                (batch.count, batch.last, batch.fault) = (i, true, Some(self.empty_stamp(&part.rows, empty)));
+                return;
+            }
+            part.before = selection.seen;
+            let (wanted, last) = self.wanted(selection, &part.rows);
+            part.wanted = wanted;
+            if last {
+                (batch.count, batch.last, batch.fault) = (i + 1, true, None);
+                return;
+            }
+        }
+    }
+
+    /// The checking pass; every wanted row is kept in the columns given, if any. Rows are checked and kept while the next ones are read.
+    fn scan(&mut self, kept: &mut [Vec<f64>]) -> Result<Scan, InputError> {
         let mut period = None;
         loop {
             let axes = self.choice.axes.iter().map(|a| (a.name.as_str(), &a.unit));
             let (rate, stamped) = (self.options.rate_hz, self.choice.time.is_some());
             let mut checker = Checker::new(axes, self.choice.quantity, self.options.kind, rate, stamped, period);
             let mut selection = Selection::new(&self.options);
-            let (mut rows, mut coming) = (Rows::default(), Rows::default());
+            let (mut batch, mut coming) = (Batch::default(), Batch::default());
             let mut first_s = 0.0;
-            let mut read = self.next(&mut selection, &mut rows)?;
-            while let Some((wanted, last)) = read {
-                if checker.rows() == 0 && !wanted.is_empty() {
-                    let skipped = selection.seen - (rows.lines.len() - wanted.start) as u64;
-                    first_s =
-                        if self.stamped() { rows.time[wanted.start] } else { skipped as f64 / rate.unwrap_or(1.0) };
+            self.gather(&mut selection, &mut batch);
+            loop {
+                let parts = batch.parts();
+                if checker.rows() == 0
+                    && let Some(part) = parts.iter().find(|part| !part.wanted.is_empty())
+                {
+                    let start = part.wanted.start;
+                    let skipped = part.before + start as u64;
+                    first_s = if self.stamped() { part.rows.time[start] } else { skipped as f64 / rate.unwrap_or(1.0) };
                     checker.set_offset(first_s);
                 }
-                let check = || {
-                    checker.push(&rows.time, &rows.values, wanted.clone())?;
-                    if period.is_none() {
-                        keep(&rows, wanted);
-                    }
-                    Ok(())
+                let check = || checker.push(&parts.iter().map(Part::samples).collect::<Vec<_>>());
+                let keep = || {
+                    kept.par_iter_mut().enumerate().filter(|_| period.is_none()).for_each(|(i, kept)| {
+                        parts.iter().for_each(|part| kept.extend_from_slice(&part.rows.values[i][part.wanted.clone()]));
+                    });
                 };
-                let next = || if last { Ok(None) } else { self.next(&mut selection, &mut coming) };
-                let (checked, next) = rayon::join(check, next);
-                checked.map_err(|back: BackwardStamp| self.backward(&back, rows.lines[back.row]))?;
-                read = next?;
-                std::mem::swap(&mut rows, &mut coming);
+                let next = || {
+                    if !batch.last {
+                        self.gather(&mut selection, &mut coming);
+                    }
+                };
+                let ((checked, ()), ()) = rayon::join(|| rayon::join(check, keep), next);
+                checked.map_err(|back: BackwardStamp| {
+                    let part = &parts[back.part];
+                    self.backward(&back, part.rows.line(part.wanted.start + back.row))
+                })?;
+                if let Some(fault) = batch.fault {
+                    return Err(fault);
+                }
+                if batch.last {
+                    break;
+                }
+                std::mem::swap(&mut batch, &mut coming);
             }
             self.enough(checker.rows(), &selection)?;
             match checker.finish() {
@@ -404,7 +435,7 @@ impl LogReader {
     pub fn open(path: &Path, options: &LogOptions) -> Result<LogReader, InputError> {
         let path = &source::resolve(path)?;
         let mut log = Log::open(path, options)?;
-        let (sha256, scan) = rayon::join(|| sha256(path), || log.scan(|_, _| {}));
+        let (sha256, scan) = rayon::join(|| sha256(path), || log.scan(&mut []));
         let (scan, sha256) = (scan?, sha256?);
         log.table.rewind()?;
         let selection = Selection::new(options);
@@ -467,15 +498,12 @@ pub fn read(path: &Path, options: &LogOptions) -> Result<(Recording, LogCheck), 
     let mut log = Log::open(path, options)?;
     let beside = usize::from(log.choice.temperature.column.is_some());
     let mut values: Vec<Vec<f64>> = vec![Vec::new(); log.choice.axes.len() + beside];
-    if let (Some(rows), None, None) = (log.table.rows(), options.start_s, options.end_s) {
-        values.iter_mut().for_each(|column| column.reserve_exact(rows as usize)); // the file is as long as it says
+    if let (Some(rows), None, None) = (log.table.about(), options.start_s, options.end_s) {
+        // once for all, so that nothing is moved; without that room the columns grow
+        values.iter_mut().for_each(|column| drop(column.try_reserve_exact(rows as usize)));
     }
-    let keep = |rows: &Rows, wanted: Range<usize>| {
-        for (kept, column) in values.iter_mut().zip(&rows.values) {
-            kept.extend_from_slice(&column[wanted.clone()]);
-        }
-    };
-    let (sha256, scan) = rayon::join(|| (!options.no_digest).then(|| sha256(path)).transpose(), || log.scan(keep));
+    let (sha256, scan) =
+        rayon::join(|| (!options.no_digest).then(|| sha256(path)).transpose(), || log.scan(&mut values));
     let (mut scan, sha256) = (scan?, sha256?);
     let axis = |(info, mut values): (AxisInfo, Vec<f64>)| {
         values.shrink_to_fit();

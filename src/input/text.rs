@@ -41,6 +41,8 @@ pub(super) struct TextTable {
     ahead: Option<Ahead>,
     /// Bytes of a chunk; none: line by line to the end.
     chunk: Option<usize>,
+    /// By the lines at the beginning, where the length of the file says something.
+    about: Option<u64>,
 }
 
 /// The bytes of the log.
@@ -94,17 +96,22 @@ impl TextTable {
         };
         let slots = vec![Slot::Skip; layout.heads.len()];
         let form = Form { delimiter: layout.delimiter, decimal_comma: layout.decimal_comma, slots, origin: None };
+        let lines = text.iter().filter(|b| **b == b'\n').count() as u64;
+        let length = std::fs::metadata(path).map_or(0, |file| file.len());
+        let source = open(path)?;
+        let about = (source.step == usize::MAX && lines > 0).then(|| length / (text.len() as u64 / lines).max(1) + 1);
         Ok(TextTable {
             path: path.to_path_buf(),
             layout,
             form,
-            source: open(path)?,
+            source,
             line_number: 0,
             line: Vec::new(),
             unended: false,
             fault: None,
             ahead: None,
             chunk: Some(CHUNK),
+            about,
         })
     }
 
@@ -166,7 +173,7 @@ impl TextTable {
     fn chunk_rows(&mut self, ahead: &mut Ahead, rows: &mut Rows) -> Result<(), Fault> {
         while let Some(mut chunk) = ahead.next(&mut *self.source.reader, self.source.step, &self.form) {
             std::mem::swap(rows, &mut chunk.rows);
-            rows.lines.iter_mut().for_each(|line| *line += self.line_number);
+            rows.before = self.line_number;
             self.line_number += chunk.lines;
             let fault = chunk.fault.take();
             ahead.give_back(chunk);
@@ -188,6 +195,12 @@ impl Table for TextTable {
     }
     fn rows(&self) -> Option<u64> {
         None
+    }
+    fn about(&self) -> Option<u64> {
+        self.about
+    }
+    fn at_hand(&self) -> bool {
+        self.ahead.as_ref().is_some_and(Ahead::at_hand)
     }
     fn named(&self) -> bool {
         self.layout.named

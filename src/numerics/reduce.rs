@@ -29,6 +29,7 @@ pub struct Moments {
 
 impl Moments {
     /// Of these values: their mean, then the squares about it, each in eight partial sums.
+    #[inline(always)]
     pub fn of(x: &[f64]) -> Moments {
         if x.is_empty() {
             return Moments::default();

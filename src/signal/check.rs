@@ -16,8 +16,6 @@ mod stamps;
 mod together;
 mod windows;
 
-use std::ops::Range;
-
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -114,9 +112,17 @@ impl<'a> Places<'a> {
     }
 }
 
-/// Time that goes back, at this row of the block pushed.
+/// Consecutive rows: stamps in s (as many as rows, or none), and for each axis (more columns may follow) values in SI.
+#[derive(Clone, Debug)]
+pub struct Samples<'a> {
+    pub times: &'a [f64],
+    pub axes: Vec<&'a [f64]>,
+}
+
+/// Time that goes back, at this row of this part of what was pushed.
 #[derive(Clone, Copy, Debug)]
 pub struct BackwardStamp {
+    pub part: usize,
     pub row: usize,
     pub from_s: f64,
     pub to_s: f64,
@@ -192,22 +198,36 @@ impl Checker {
         self.offset_s = seconds;
     }
 
-    /// These rows of a block: stamps in s (as many as rows, or none) and per axis SI values. Backward time is an error unless
-    /// the rate was given.
-    pub fn push(&mut self, times: &[f64], values: &[Vec<f64>], rows: Range<usize>) -> Result<(), BackwardStamp> {
-        let places = Places { first: self.rows, times: times.get(rows.clone()).unwrap_or_default() };
-        let columns: Vec<&[f64]> = values.iter().take(self.axes.len()).map(|column| &column[rows.clone()]).collect();
+    /// Further rows, part by part. Backward time is an error unless the rate was given.
+    pub fn push(&mut self, parts: &[Samples]) -> Result<(), BackwardStamp> {
+        let axes = self.axes.len();
+        let placed: Vec<(Places, &[&[f64]])> = parts
+            .iter()
+            .map(|part| {
+                let places = Places { first: self.rows, times: part.times };
+                let columns = part.axes.get(..axes).unwrap_or_default();
+                self.rows += columns.first().map_or(0, |column| column.len()) as u64;
+                (places, columns)
+            })
+            .collect();
         let (axes, together, stamps) = (&mut self.axes, &mut self.together, self.stamps.as_mut());
         let strict = self.rate_hz.is_none();
-        let each_axis = || axes.par_iter_mut().zip(&columns).for_each(|(axis, column)| axis.add_all(column, places));
-        let all_axes = || together.add_all(&columns, places);
-        let time = || stamps.and_then(|stamps| stamps.add_all(places, strict));
+        let each_axis = || {
+            axes.par_iter_mut().enumerate().for_each(|(i, axis)| {
+                placed.iter().for_each(|(places, columns)| axis.add_all(columns[i], *places));
+            });
+        };
+        let all_axes = || placed.iter().for_each(|(places, columns)| together.add_all(columns, *places));
+        let time = || {
+            stamps.and_then(|stamps| {
+                placed.iter().enumerate().find_map(|(part, (places, _))| {
+                    let (row, from_s) = stamps.add_all(*places, strict)?;
+                    Some(BackwardStamp { part, row, from_s, to_s: places.at(row).time_s })
+                })
+            })
+        };
         let (back, _) = rayon::join(time, || rayon::join(each_axis, all_axes));
-        self.rows += rows.len() as u64;
-        match back {
-            Some((row, from_s)) => Err(BackwardStamp { row: rows.start + row, from_s, to_s: places.at(row).time_s }),
-            None => Ok(()),
-        }
+        back.map_or(Ok(()), Err)
     }
 
     pub fn finish(self) -> Outcome {

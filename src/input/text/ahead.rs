@@ -15,20 +15,15 @@ use crate::input::Rows;
 
 /// Bytes of a chunk; one with a longer line grows.
 pub(super) const CHUNK: usize = 1 << 18;
-/// Chunks at a time, however many threads there are.
-const MOST: usize = 64;
+/// Chunks at a time: so many for each thread, that threads seldom wait for the last one, and no more.
+const EACH: usize = 16;
+const MOST: usize = 128;
 
-/// Lines and what was read of them.
+/// What was read of consecutive lines.
 #[derive(Debug, Default)]
 pub(super) struct Chunk {
     /// In the order of the file, among those read together.
     number: usize,
-    /// [`LEAD`] bytes, the lines, [`ROOM`] bytes.
-    text: Vec<u8>,
-    /// Where the lines end.
-    end: usize,
-    unended: bool,
-    parser: Lines,
     /// Line numbers count from the beginning of the chunk.
     pub(super) rows: Rows,
     pub(super) lines: u64,
@@ -36,16 +31,25 @@ pub(super) struct Chunk {
     pub(super) fault: Option<Fault>,
 }
 
-impl Chunk {
-    fn parse(&mut self, form: &Form) {
-        self.rows.clear(form.columns_of_values());
-        let (lines, fault) = {
-            let text = Text { bytes: &self.text, end: self.end, unended: self.unended };
-            self.parser.read(form, text, &mut self.rows)
-        };
-        self.lines = lines;
+/// Lines, in the hands of one thread until they are parsed.
+#[derive(Debug, Default)]
+struct Page {
+    /// [`LEAD`] bytes, the lines, [`ROOM`] bytes.
+    text: Vec<u8>,
+    /// Where the lines end.
+    end: usize,
+    unended: bool,
+    parser: Lines,
+}
+
+impl Page {
+    fn parse(&mut self, form: &Form, chunk: &mut Chunk) {
+        chunk.rows.clear(form.columns_of_values());
+        let text = Text { bytes: &self.text, end: self.end, unended: self.unended };
+        let (lines, fault) = self.parser.read(form, text, &mut chunk.rows);
+        chunk.lines = lines;
         // a line that cannot be read stands behind all others
-        self.fault = fault.or(self.fault.take());
+        chunk.fault = fault.or(chunk.fault.take());
     }
 }
 
@@ -55,40 +59,60 @@ pub(super) struct Ahead {
     size: usize,
     parsed: VecDeque<Chunk>,
     spare: Vec<Chunk>,
+    /// As many as there are threads: each stays in the cache of one.
+    pages: Vec<Page>,
     /// The beginning of the line at which the last chunk was cut.
     tail: Vec<u8>,
     ended: bool,
 }
 
+/// Of the threads that read chunks.
+#[derive(Debug, Default)]
+struct Hands {
+    pages: Vec<Page>,
+    done: Vec<Chunk>,
+}
+
 impl Ahead {
     pub(super) fn new(size: usize) -> Self {
-        Ahead { size, parsed: VecDeque::new(), spare: Vec::new(), tail: Vec::new(), ended: false }
+        let (parsed, spare, pages) = (VecDeque::new(), Vec::new(), Vec::new());
+        Ahead { size, parsed, spare, pages, tail: Vec::new(), ended: false }
+    }
+
+    /// There are parsed chunks.
+    pub(super) fn at_hand(&self) -> bool {
+        !self.parsed.is_empty()
     }
 
     /// The next chunk, parsed; `step`: the most that is asked of the reader at once.
     pub(super) fn next(&mut self, reader: &mut (dyn BufRead + Send), step: usize, form: &Form) -> Option<Chunk> {
-        if self.parsed.is_empty() {
-            let chunks = (4 * rayon::current_num_threads()).clamp(4, MOST);
+        if self.parsed.is_empty() && !self.ended {
+            let chunks = (EACH * rayon::current_num_threads()).clamp(EACH, MOST);
+            let hands = Mutex::new(Hands { pages: std::mem::take(&mut self.pages), done: Vec::new() });
+            let hands_now = || hands.lock().unwrap_or_else(PoisonError::into_inner);
             // who has the file reads a chunk, and parses it while others read and parse theirs
             let file = Mutex::new((&mut *self, reader, 0));
-            let done = Mutex::new(Vec::new());
-            (0..chunks).into_par_iter().for_each(|_| {
-                let mut chunk = {
+            (0..chunks).into_par_iter().with_max_len(1).for_each(|_| {
+                let mut page = hands_now().pages.pop().unwrap_or_default();
+                let chunk = {
                     let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
                     let (ahead, reader, number) = &mut *file;
-                    let mut chunk = ahead.spare.pop().unwrap_or_default();
-                    if !ahead.fill(&mut chunk, *reader, step) {
-                        return;
-                    }
-                    chunk.number = *number;
                     *number += 1;
-                    chunk
+                    let mut chunk = ahead.spare.pop().unwrap_or_default();
+                    chunk.number = *number;
+                    ahead.fill(&mut page, &mut chunk, *reader, step).then_some(chunk)
                 };
-                chunk.parse(form);
-                done.lock().unwrap_or_else(PoisonError::into_inner).push(chunk);
+                let chunk = chunk.map(|mut chunk| {
+                    page.parse(form, &mut chunk);
+                    chunk
+                });
+                let mut hands = hands_now();
+                hands.pages.push(page);
+                hands.done.extend(chunk);
             });
-            let mut done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+            let Hands { pages, mut done } = hands.into_inner().unwrap_or_else(PoisonError::into_inner);
             done.sort_unstable_by_key(|chunk| chunk.number);
+            self.pages = pages;
             self.parsed.extend(done);
         }
         self.parsed.pop_front()
@@ -100,19 +124,19 @@ impl Ahead {
     }
 
     /// False if there is nothing more.
-    fn fill(&mut self, chunk: &mut Chunk, reader: &mut (dyn BufRead + Send), step: usize) -> bool {
+    fn fill(&mut self, page: &mut Page, chunk: &mut Chunk, reader: &mut (dyn BufRead + Send), step: usize) -> bool {
         if self.ended {
             return false;
         }
         let mut end = LEAD + self.tail.len();
         let mut most = LEAD + self.size.max(self.tail.len() + 1).min(LONGEST_LINE as usize);
-        chunk.text.resize(chunk.text.len().max(most + ROOM), 0);
-        chunk.text[LEAD..end].copy_from_slice(&self.tail);
+        page.text.resize(page.text.len().max(most + ROOM), 0);
+        page.text[LEAD..end].copy_from_slice(&self.tail);
         self.tail.clear();
-        (chunk.unended, chunk.fault) = (false, None);
+        (page.unended, chunk.fault) = (false, None);
         loop {
             if end == most {
-                if chunk.text[LEAD..end].contains(&b'\n') {
+                if page.text[LEAD..end].contains(&b'\n') {
                     break;
                 }
                 if end - LEAD == LONGEST_LINE as usize {
@@ -120,9 +144,9 @@ impl Ahead {
                     break;
                 }
                 most = (LEAD + 2 * (end - LEAD)).min(LEAD + LONGEST_LINE as usize);
-                chunk.text.resize(chunk.text.len().max(most + ROOM), 0);
+                page.text.resize(page.text.len().max(most + ROOM), 0);
             }
-            match reader.read(&mut chunk.text[end..most.min(end.saturating_add(step))]) {
+            match reader.read(&mut page.text[end..most.min(end.saturating_add(step))]) {
                 Ok(0) => {
                     self.ended = true;
                     break;
@@ -135,15 +159,15 @@ impl Ahead {
                 }
             }
         }
-        let whole = chunk.text[LEAD..end].iter().rposition(|b| *b == b'\n').map_or(LEAD, |last| LEAD + last + 1);
-        chunk.end = whole;
+        let whole = page.text[LEAD..end].iter().rposition(|b| *b == b'\n').map_or(LEAD, |last| LEAD + last + 1);
+        page.end = whole;
         if !self.ended {
-            self.tail.extend_from_slice(&chunk.text[whole..end]);
+            self.tail.extend_from_slice(&page.text[whole..end]);
         } else if chunk.fault.is_none() && whole < end {
             // the file stops inside a line
-            chunk.text[end] = b'\n';
-            (chunk.end, chunk.unended) = (end + 1, true);
+            page.text[end] = b'\n';
+            (page.end, page.unended) = (end + 1, true);
         }
-        chunk.end > LEAD || chunk.fault.is_some()
+        page.end > LEAD || chunk.fault.is_some()
     }
 }

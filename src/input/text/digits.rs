@@ -16,6 +16,16 @@ const EXACT_TEN: [f64; 23] = [
     1e21, 1e22,
 ];
 
+const SIGNED_TEN: [[f64; 23]; 2] = {
+    let mut table = [EXACT_TEN; 2];
+    let mut i = 0;
+    while i < 23 {
+        table[1][i] = -EXACT_TEN[i];
+        i += 1;
+    }
+    table
+};
+
 const fn powers<const N: usize>(base: u64) -> [u64; N] {
     let mut table = [1; N];
     let mut i = 1;
@@ -119,6 +129,26 @@ impl Bytes for pulp::x86::V3 {
     }
 }
 
+#[cfg(target_arch = "x86_64")]
+impl Bytes for pulp::x86::V4 {
+    #[inline(always)]
+    fn ends(self, block: &[u8; 64], separators: [u8; 2]) -> (u64, u64, u64) {
+        let block = pulp::cast(*block);
+        let is = |byte: u8| self.avx512bw._mm512_cmpeq_epi8_mask(block, self.avx512f._mm512_set1_epi8(byte as i8));
+        let feeds = is(b'\n');
+        (is(separators[0]) | is(separators[1]) | feeds, feeds, is(b'"'))
+    }
+    #[inline(always)]
+    fn others(self, text: &[u8; 32]) -> u32 {
+        let moved = self.avx2._mm256_sub_epi8(pulp::cast(*text), self.avx._mm256_set1_epi8(b'0' as i8));
+        self.avx512bw._mm256_cmpgt_epu8_mask(moved, self.avx._mm256_set1_epi8(9))
+    }
+    #[inline(always)]
+    fn sixteen(self, text: &[u8; 16], count: usize) -> u64 {
+        (*self).sixteen(text, count)
+    }
+}
+
 /// All bits of the last bytes, so many.
 #[cfg(target_arch = "x86_64")]
 const fn keep() -> [[u8; 16]; 17] {
@@ -144,11 +174,21 @@ pub(super) fn eight(text: &[u8], end: usize, count: usize) -> u64 {
     first.wrapping_add(second) >> 32
 }
 
-/// `whole`·10^count + fraction over 10^count for at most 19 digits in all, correctly rounded.
+/// `whole`·10^count + fraction, for at most 19 digits in all.
 #[inline(always)]
-pub(super) fn decimal(whole: u64, fraction: u64, count: usize) -> f64 {
-    let m = whole * TEN[count] + fraction;
-    if m <= 1 << 53 { m as i64 as f64 / EXACT_TEN[count] } else { wide(m, -(count as i32)).unwrap_or(f64::NAN) }
+pub(super) fn joined(whole: u64, fraction: u64, count: usize) -> u64 {
+    whole * TEN[count] + fraction
+}
+
+/// m and 10^count are exact in f64, so that one division is correctly rounded.
+#[inline(always)]
+pub(super) fn is_exact(m: u64) -> bool {
+    m <= 1 << 53
+}
+
+/// m over 10^count for an m that is not exact, correctly rounded.
+pub(super) fn inexact(m: u64, count: usize) -> f64 {
+    wide(m, -(count as i32)).unwrap_or(f64::NAN)
 }
 
 /// A number of at most 19 digits after leading zeros, with or without sign, point and exponent; `None` for anything else.
@@ -204,10 +244,10 @@ fn signed(text: &[u8]) -> (bool, &[u8]) {
     }
 }
 
-/// 10^count for at most 18 digits of a fraction.
+/// 10^count for at most 22 digits of a fraction, with the sign of the number.
 #[inline(always)]
-pub(super) fn ten(count: usize) -> f64 {
-    EXACT_TEN[count]
+pub(super) fn signed_ten(count: usize, negative: bool) -> f64 {
+    SIGNED_TEN[usize::from(negative)][count]
 }
 
 /// m·10^e, correctly rounded; `None` where neither way of the module's description applies.

@@ -5,7 +5,7 @@
 
 use super::super::Rows;
 use super::super::sniff::{self, Delimiter};
-use super::digits::{self, Bytes, LEAD, Words, decimal, eight, ten};
+use super::digits::{self, Bytes, LEAD, Words, eight, inexact, is_exact, joined, signed_ten};
 use super::row::{Fault, Form, Slot, since, stamp};
 
 /// Lines are looked at in pieces that stay in the nearest cache.
@@ -18,6 +18,19 @@ pub(super) const ROOM: usize = 64;
 pub(super) struct Lines {
     /// Of all fields of a piece.
     ends: Vec<u32>,
+    column: Column,
+}
+
+/// The fields of one column: found one by one, divided many at a time.
+#[derive(Debug, Default)]
+struct Column {
+    /// Of stamps only.
+    whole: Vec<i64>,
+    part: Vec<i64>,
+    /// With the sign of the number.
+    divisor: Vec<f64>,
+    /// Those that are something else than digits with a point, and where.
+    others: Vec<(usize, f64)>,
 }
 
 /// Lines to be read: `text[LEAD..end]`, each with its end, and [`ROOM`] bytes behind them.
@@ -33,7 +46,9 @@ impl Lines {
     /// The lines into `rows`, numbered from 1. Returns how many there are; the fault is that of the line behind them.
     pub(super) fn read(&mut self, form: &Form, text: Text, rows: &mut Rows) -> (u64, Option<Fault>) {
         #[cfg(target_arch = "x86_64")]
-        if let Some(simd) = pulp::x86::V3::try_new() {
+        if let Some(simd) = pulp::x86::V4::try_new() {
+            return simd.vectorize(Reading { lines: self, form, text, rows, simd });
+        } else if let Some(simd) = pulp::x86::V3::try_new() {
             return simd.vectorize(Reading { lines: self, form, text, rows, simd });
         }
         self.read_by(Words, form, text, rows)
@@ -63,7 +78,7 @@ impl Lines {
                 None => None,
             };
             let read = match &fields {
-                Some(fields) if fields.numbers(simd, rows) => fields.rows as u64,
+                Some(fields) if fields.numbers(simd, &mut self.column, rows) => fields.rows as u64,
                 _ => 0,
             };
             if read > 0 {
@@ -149,16 +164,16 @@ fn truncate(rows: &mut Rows, whole: usize) {
 
 /// [`Lines::read_by`] as it is called where the processor has these instructions.
 #[cfg(target_arch = "x86_64")]
-struct Reading<'a> {
+struct Reading<'a, S> {
     lines: &'a mut Lines,
     form: &'a Form,
     text: Text<'a>,
     rows: &'a mut Rows,
-    simd: pulp::x86::V3,
+    simd: S,
 }
 
 #[cfg(target_arch = "x86_64")]
-impl pulp::NullaryFnOnce for Reading<'_> {
+impl<S: Bytes> pulp::NullaryFnOnce for Reading<'_, S> {
     type Output = (u64, Option<Fault>);
 
     #[inline(always)]
@@ -239,49 +254,72 @@ impl<'a> Fields<'a> {
 
     /// All wanted columns; false if some field shows that the line is not alike.
     #[inline(always)]
-    fn numbers(&self, simd: impl Bytes, rows: &mut Rows) -> bool {
-        for (column, slot) in self.form.slots.iter().enumerate() {
+    fn numbers(&self, simd: impl Bytes, column: &mut Column, rows: &mut Rows) -> bool {
+        let Column { whole: wholes, part: parts, divisor: divisors, others } = column;
+        wholes.resize(self.rows, 0);
+        parts.resize(self.rows, 0);
+        divisors.resize(self.rows, 1.0);
+        for (first, slot) in self.form.slots.iter().enumerate() {
+            others.clear();
+            let mut at = first;
             match *slot {
                 Slot::Skip => {}
                 Slot::Axis(axis) | Slot::Beside(axis) => {
-                    let values = &mut rows.values[axis];
-                    let whole = values.len();
-                    values.resize(whole + self.rows, 0.0);
-                    let mut at = column;
-                    for value in &mut values[whole..] {
+                    for (row, (part, divisor)) in parts.iter_mut().zip(&mut *divisors).enumerate() {
                         let (from, end) = self.place(at);
                         at += self.count;
-                        *value = match self.decimal(simd, from, end) {
-                            Some(Decimal { negative, whole, fraction, count }) => {
-                                let value = decimal(whole, fraction, count);
-                                f64::from_bits(value.to_bits() | u64::from(negative) << 63)
+                        if let Some(Decimal { negative, whole, fraction, count }) = self.decimal(simd, from, end) {
+                            let m = joined(whole, fraction, count);
+                            (*part, *divisor) = (m as i64, signed_ten(count, negative));
+                            if !is_exact(m) {
+                                let value = inexact(m, count);
+                                others.push((row, if negative { -value } else { value }));
                             }
-                            None => match self.other_number(from, end, slot) {
-                                Some(value) => value,
-                                None => return false,
-                            },
-                        };
+                        } else if let Some(value) = self.other_number(from, end, slot) {
+                            others.push((row, value));
+                        } else {
+                            return false;
+                        }
+                    }
+                    let values = &mut rows.values[axis];
+                    let before = values.len();
+                    values.resize(before + self.rows, 0.0);
+                    let values = &mut values[before..];
+                    for ((value, part), divisor) in values.iter_mut().zip(&*parts).zip(&*divisors) {
+                        *value = *part as f64 / divisor;
+                    }
+                    for (row, value) in &*others {
+                        values[*row] = *value;
                     }
                 }
                 Slot::Time => {
-                    let Some(origin) = self.form.origin else { return false };
-                    let whole = rows.time.len();
-                    rows.time.resize(whole + self.rows, 0.0);
-                    let mut at = column;
-                    for time in &mut rows.time[whole..] {
+                    // so that no difference from it overflows
+                    let Some(origin) = self.form.origin.filter(|(whole, _)| whole.unsigned_abs() < 1 << 62) else {
+                        return false;
+                    };
+                    for (row, ((whole_part, part), divisor)) in
+                        wholes.iter_mut().zip(&mut *parts).zip(&mut *divisors).enumerate()
+                    {
                         let (from, end) = self.place(at);
                         at += self.count;
-                        let (whole, part) = match self.decimal(simd, from, end) {
-                            Some(Decimal { negative, whole, fraction, count }) => {
-                                let (whole, part) = (whole as i64, fraction as i64 as f64 / ten(count));
-                                if negative { (-whole, -part) } else { (whole, part) }
-                            }
-                            None => match self.other_stamp(from, end) {
-                                Some(split) => split,
-                                None => return false,
-                            },
-                        };
-                        *time = since(origin, whole, part);
+                        if let Some(Decimal { negative, whole, fraction, count }) = self.decimal(simd, from, end) {
+                            *whole_part = if negative { -(whole as i64) } else { whole as i64 };
+                            (*part, *divisor) = (fraction as i64, signed_ten(count, negative));
+                        } else if let Some((whole, part)) = self.other_stamp(from, end) {
+                            others.push((row, since(origin, whole, part)));
+                        } else {
+                            return false;
+                        }
+                    }
+                    let before = rows.time.len();
+                    rows.time.resize(before + self.rows, 0.0);
+                    let times = &mut rows.time[before..];
+                    for (((time, whole), part), divisor) in times.iter_mut().zip(&*wholes).zip(&*parts).zip(&*divisors)
+                    {
+                        *time = (whole - origin.0) as f64 + (*part as f64 / divisor - origin.1);
+                    }
+                    for (row, time) in &*others {
+                        times[*row] = *time;
                     }
                 }
             }

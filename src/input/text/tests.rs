@@ -24,7 +24,7 @@ impl Read {
         self.time.extend(bits(&rows.time));
         self.values.resize(rows.values.len(), Vec::new());
         self.values.iter_mut().zip(&rows.values).for_each(|(all, part)| all.extend(bits(part)));
-        self.lines.extend(rows.lines.iter().map(|line| line + before));
+        self.lines.extend(rows.lines.iter().map(|line| line + rows.before + before));
     }
 }
 
@@ -69,15 +69,25 @@ fn in_chunks(text: &[u8], form: &Form, size: usize, step: usize) -> Read {
     read
 }
 
-/// At once, by the instructions that every processor has.
-fn by_words(text: &[u8], form: &Form) -> Read {
+/// At once, by the instructions that every processor has, and by those of each kind that this one has.
+fn each_way(text: &[u8], form: &Form) -> Vec<Read> {
+    let mut all = vec![by(Words, text, form)];
+    #[cfg(target_arch = "x86_64")]
+    {
+        all.extend(pulp::x86::V3::try_new().map(|simd| by(simd, text, form)));
+        all.extend(pulp::x86::V4::try_new().map(|simd| by(simd, text, form)));
+    }
+    all
+}
+
+fn by(simd: impl Bytes, text: &[u8], form: &Form) -> Read {
     let mut bytes = vec![b'7'; LEAD];
     bytes.extend(text);
     let end = bytes.len();
     bytes.resize(end + ROOM, b'7');
     let (mut rows, mut read) = (Rows::default(), Read::default());
     rows.clear(form.columns_of_values());
-    let (lines, fault) = Lines::default().read_by(Words, form, Text { bytes: &bytes, end, unended: false }, &mut rows);
+    let (lines, fault) = Lines::default().read_by(simd, form, Text { bytes: &bytes, end, unended: false }, &mut rows);
     read.add(&rows, 0);
     read.fault = fault.map(|fault| (lines + 1, fault));
     read
@@ -227,7 +237,9 @@ fn every_number_is_that_of_the_plain_way() {
         assert!(lines.len() > 40_000, "{}", lines.len());
         let text = lines.join("\n") + "\n";
         let expected = plainly(text.as_bytes(), &form);
-        for found in [in_chunks(text.as_bytes(), &form, CHUNK, usize::MAX), by_words(text.as_bytes(), &form)] {
+        let mut found = each_way(text.as_bytes(), &form);
+        found.push(in_chunks(text.as_bytes(), &form, CHUNK, usize::MAX));
+        for found in found {
             for (i, at) in expected.lines.iter().enumerate() {
                 let bits =
                     |read: &Read| read.time.get(i).copied().or(read.values.first().and_then(|v| v.get(i).copied()));
@@ -305,7 +317,7 @@ fn every_form_is_read_as_the_plain_way() {
             assert_eq!(in_chunks(text, &form, size, step), expected, "{}", what());
         }
         if text.is_empty() || text.ends_with(b"\n") {
-            assert_eq!(by_words(text, &form), expected, "{}", what());
+            each_way(text, &form).into_iter().for_each(|read| assert_eq!(read, expected, "{}", what()));
         }
     }
     assert!((300..2700).contains(&faults), "{faults} of 3000 texts were refused");
@@ -364,6 +376,10 @@ fn many_bytes_at_once() {
         assert_eq!(all(Words, &block, start, &text), expected);
         #[cfg(target_arch = "x86_64")]
         if let Some(simd) = pulp::x86::V3::try_new() {
+            assert_eq!(all(simd, &block, start, &text), expected);
+        }
+        #[cfg(target_arch = "x86_64")]
+        if let Some(simd) = pulp::x86::V4::try_new() {
             assert_eq!(all(simd, &block, start, &text), expected);
         }
     }

@@ -14,6 +14,8 @@
 
 use std::collections::BTreeMap;
 
+use pulp::{Arch, NullaryFnOnce};
+
 use super::robust::{Sample, median, median_and_spread, quantile, short};
 use super::stamps::Count;
 use super::windows::{Windows, extent, surely_quiet};
@@ -82,6 +84,22 @@ pub(super) struct AxisCheck {
     rest: Windows,
 }
 
+/// [`AxisCheck::add_parts`] as it is called where the processor can do more at once; every way gives the same.
+struct Adding<'a> {
+    axis: &'a mut AxisCheck,
+    values: &'a [f64],
+    places: Places<'a>,
+}
+
+impl NullaryFnOnce for Adding<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.axis.add_parts(self.values, self.places);
+    }
+}
+
 impl AxisCheck {
     pub(super) fn new(name: &str, unit: &Unit, quantity: Quantity, kind: InputKind) -> Self {
         AxisCheck {
@@ -111,7 +129,12 @@ impl AxisCheck {
     }
 
     /// The next values (SI): many at once where they are finite, with the same result as one by one.
-    pub(super) fn add_all(&mut self, mut values: &[f64], mut places: Places) {
+    pub(super) fn add_all(&mut self, values: &[f64], places: Places) {
+        Arch::new().dispatch(Adding { axis: self, values, places });
+    }
+
+    #[inline(always)]
+    fn add_parts(&mut self, mut values: &[f64], mut places: Places) {
         while !values.is_empty() {
             // up to the end of the window in which outliers are sought
             let (part, rest) = values.split_at(values.len().min(WINDOW - self.window.len()));
@@ -125,6 +148,7 @@ impl AxisCheck {
         }
     }
 
+    #[inline(always)]
     fn add_finite(&mut self, part: &[f64], places: Places) {
         let (smallest, largest) = extent(part);
         self.usable += part.len() as u64;
@@ -153,6 +177,7 @@ impl AxisCheck {
     }
 
     /// The next value (SI).
+    #[inline(never)]
     fn add(&mut self, value: f64, place: Place) {
         if !value.is_finite() {
             self.nan.add(place);
@@ -196,6 +221,7 @@ impl AxisCheck {
     }
 
     /// Values that do not reach beyond the window.
+    #[inline(always)]
     fn look(&mut self, x: &[f64], places: Places) {
         self.sample.add_all(x);
         self.rest.add_all(x, places);
@@ -218,10 +244,15 @@ impl AxisCheck {
     }
 
     /// Outliers of a window.
+    #[inline(always)]
     fn judge(&mut self, window: &[f64], place: impl Fn(usize) -> Place) {
-        if surely_quiet(window, OUTLIER * 1.4826) {
-            return;
+        if !surely_quiet(window, OUTLIER * 1.4826) {
+            self.outliers_of(window, place);
         }
+    }
+
+    #[inline(never)]
+    fn outliers_of(&mut self, window: &[f64], place: impl Fn(usize) -> Place) {
         self.scratch.clear();
         self.scratch.extend_from_slice(window);
         let (center, mut spread) = median_and_spread(&mut self.scratch);

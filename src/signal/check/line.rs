@@ -18,6 +18,7 @@ pub(super) struct Line {
 
 impl Line {
     /// Times of consecutive rows.
+    #[inline(always)]
     pub(super) fn add(&mut self, first: u64, times: &[f64]) {
         let mut row = first as f64;
         let mut left = times;
@@ -33,6 +34,7 @@ impl Line {
         }
     }
 
+    #[inline(always)]
     fn close(&mut self) {
         let count = self.times.len() as f64;
         if count == 0.0 {
@@ -63,12 +65,17 @@ impl Line {
 }
 
 /// Sum of a term of each pair, in eight partial sums.
+#[inline(always)]
 fn by_eight(x: &[f64], y: &[f64], term: impl Fn(f64, f64) -> f64) -> f64 {
+    let ((chunks, rest), (others, other_rest)) = (x.as_chunks::<8>(), y.as_chunks::<8>());
     let mut sums = [0.0; 8];
-    for (x, y) in x.chunks(8).zip(y.chunks(8)) {
-        for (sum, (x, y)) in sums.iter_mut().zip(x.iter().zip(y)) {
-            *sum += term(*x, *y);
+    for (x, y) in chunks.iter().zip(others) {
+        for i in 0..8 {
+            sums[i] += term(x[i], y[i]);
         }
+    }
+    for (sum, (x, y)) in sums.iter_mut().zip(rest.iter().zip(other_rest)) {
+        *sum += term(*x, *y);
     }
     let [a, b, c, d, e, f, g, h] = sums;
     ((a + b) + (c + d)) + ((e + f) + (g + h))

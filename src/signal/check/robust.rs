@@ -14,6 +14,7 @@ impl Sample {
     pub(super) fn new(capacity: usize) -> Self {
         Sample { kept: Vec::new(), level: 0, index: 0, capacity }
     }
+    #[inline(never)]
     pub(super) fn add(&mut self, x: f64) {
         let hash = mix(self.index);
         self.index += 1;
@@ -28,18 +29,22 @@ impl Sample {
         }
     }
     /// The same one by one.
-    pub(super) fn add_all(&mut self, x: &[f64]) {
-        let first = self.index;
-        let mut bound = u64::MAX >> self.level;
-        for (index, x) in (first..).zip(x) {
+    #[inline(always)]
+    pub(super) fn add_all(&mut self, mut x: &[f64]) {
+        /// Looked at together: of most of them nothing stays.
+        const GROUP: usize = 64;
+        while !x.is_empty() {
+            let (group, rest) = x.split_at(x.len().min(GROUP));
             // hash.leading_zeros() >= level
-            if mix(index) <= bound {
-                self.index = index;
-                self.add(*x);
-                bound = u64::MAX >> self.level;
+            let bound = u64::MAX >> self.level;
+            let first = self.index;
+            if group.len() < GROUP || (0..GROUP as u64).fold(false, |any, i| any | (mix(first + i) <= bound)) {
+                group.iter().for_each(|x| self.add(*x));
+            } else {
+                self.index += GROUP as u64;
             }
+            x = rest;
         }
-        self.index = first + x.len() as u64;
     }
     pub(super) fn values(&self) -> Vec<f64> {
         self.kept.iter().map(|(_, x)| *x).collect()
@@ -47,6 +52,7 @@ impl Sample {
 }
 
 /// The finaliser of SplitMix64 (Steele, Lea and Flood 2014).
+#[inline(always)]
 fn mix(index: u64) -> u64 {
     let mut z = index.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -11,6 +11,8 @@
 //!   within 2.5 T): then one stamp was late.
 //! - T is the typical step, refined to (span − gaps) / (steps outside gaps), so that it does not drift over a long log.
 
+use pulp::{Arch, NullaryFnOnce};
+
 use super::line::Line;
 use super::robust::{Sample, quantile};
 use super::windows::extent;
@@ -98,6 +100,22 @@ pub(super) enum Verdict {
     NoTime,
 }
 
+/// [`Stamps::add_steps`] as it is called where the processor can do more at once; every way gives the same.
+struct Regular<'a> {
+    stamps: &'a mut Stamps,
+    times: &'a [f64],
+    row: u64,
+}
+
+impl NullaryFnOnce for Regular<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn call(self) -> bool {
+        self.stamps.add_steps(self.times, self.row)
+    }
+}
+
 impl Stamps {
     pub(super) fn new(period: Option<f64>) -> Self {
         Stamps {
@@ -144,6 +162,11 @@ impl Stamps {
 
     /// Takes the stamps if every step goes on and none is long.
     fn add_regular(&mut self, times: &[f64], row: u64) -> bool {
+        Arch::new().dispatch(Regular { stamps: self, times, row })
+    }
+
+    #[inline(always)]
+    fn add_steps(&mut self, times: &[f64], row: u64) -> bool {
         let Some(period) = self.provisional.filter(|_| self.rows > 0 && self.repeats == 0) else { return false };
         let mut steps = std::mem::take(&mut self.scratch);
         steps.clear();

@@ -5,12 +5,16 @@ fn deg() -> Unit {
     Unit::parse("deg/s").unwrap()
 }
 
+fn samples<'a>(times: &'a [f64], values: &'a [Vec<f64>]) -> Samples<'a> {
+    Samples { times, axes: values.iter().map(Vec::as_slice).collect() }
+}
+
 fn checked(times: &[f64], values: &[Vec<f64>], rate: Option<f64>) -> LogCheck {
     let unit = deg();
     let names = ["x", "y", "z"];
     let axes = names.iter().take(values.len()).map(|n| (*n, &unit));
     let mut checker = Checker::new(axes, Quantity::AngularRate, InputKind::Rate, rate, !times.is_empty(), None);
-    checker.push(times, values, 0..values[0].len()).unwrap();
+    checker.push(&[samples(times, values)]).unwrap();
     match checker.finish() {
         Outcome::Done { check, .. } => check,
         other => panic!("{other:?}"),
@@ -45,8 +49,9 @@ fn backward_time_is_an_error_unless_the_rate_is_given() {
     let unit = deg();
     let columns = [values(100, 0.0)];
     let mut strict = Checker::new([("x", &unit)], Quantity::AngularRate, InputKind::Rate, None, true, None);
-    let back = strict.push(&times, &columns, 0..100).unwrap_err();
-    assert_eq!((back.row, back.from_s, back.to_s), (60, 59.0, 3.0));
+    let (start, rest) = (vec![columns[0][..50].to_vec()], vec![columns[0][50..].to_vec()]);
+    let back = strict.push(&[samples(&times[..50], &start), samples(&times[50..], &rest)]).unwrap_err();
+    assert_eq!((back.part, back.row, back.from_s, back.to_s), (1, 10, 59.0, 3.0));
     let check = checked(&times, &columns, Some(1.0));
     assert_eq!(check.time_base, TimeBase::Given);
     assert!(check.findings.iter().any(|f| f.kind == "backward-stamp" && f.count == 1 && f.first_index == 60));

@@ -1,5 +1,7 @@
 //! Rows in which all axes are alike: all zero, or all as in the row before.
 
+use pulp::{Arch, NullaryFnOnce};
+
 use super::Places;
 use super::stamps::Count;
 
@@ -23,6 +25,22 @@ pub(super) struct Together {
     before: Vec<f64>,
 }
 
+/// [`Together::add_parts`] as it is called where the processor can do more at once; every way gives the same.
+struct Adding<'a> {
+    together: &'a mut Together,
+    columns: &'a [&'a [f64]],
+    places: Places<'a>,
+}
+
+impl NullaryFnOnce for Adding<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.together.add_parts(self.columns, self.places);
+    }
+}
+
 impl Together {
     pub(super) fn new(axes: usize) -> Self {
         let none = Alike { rows: Count::default(), all_but: vec![0; axes] };
@@ -31,6 +49,11 @@ impl Together {
 
     /// One column of further rows for each axis.
     pub(super) fn add_all(&mut self, columns: &[&[f64]], places: Places) {
+        Arch::new().dispatch(Adding { together: self, columns, places });
+    }
+
+    #[inline(always)]
+    fn add_parts(&mut self, columns: &[&[f64]], places: Places) {
         let rows = columns.first().map_or(0, |column| column.len());
         if columns.len() < 2 {
             return;
@@ -62,6 +85,7 @@ impl Together {
 }
 
 impl Alike {
+    #[inline(never)]
     fn add(&mut self, axes: usize, rows: std::ops::Range<usize>, places: Places, is: impl Fn(usize, usize) -> bool) {
         for row in rows {
             let mut others = (0..axes).filter(|axis| !is(*axis, row));

@@ -27,6 +27,7 @@ impl Windows {
         Windows { size: PIECE as u64, done: Vec::new(), open: Moments::default(), start: None, piece, at }
     }
 
+    #[inline(always)]
     pub(super) fn add_all(&mut self, mut x: &[f64], mut places: Places) {
         while !x.is_empty() {
             let taken = if self.piece.is_empty() && x.len() >= PIECE {
@@ -48,6 +49,7 @@ impl Windows {
         }
     }
 
+    #[inline(never)]
     fn close(&mut self, piece: Moments, at: Place) {
         let start = *self.start.get_or_insert(at);
         self.open.merge(&piece);
@@ -71,6 +73,7 @@ impl Windows {
 /// largest distance from it and e = d/32: if fewer than half of the values are below c - e and fewer than half above c + e, the median lies
 /// between, and no value is further from it than d + e. If also fewer than half lie within t + e of c, the deviation is at least t; so
 /// t = (d + e)/bound is enough. A part in 10^6 is added for rounding.
+#[inline(always)]
 pub(super) fn surely_quiet(x: &[f64], bound: f64) -> bool {
     let center = by_eight(x, |v| v) / x.len() as f64;
     let (smallest, largest) = extent(x);

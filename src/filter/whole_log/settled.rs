@@ -110,7 +110,7 @@ impl<const N: usize> Settled<N> {
             let eight = &self.eight;
             let inverse = wide::<S>(&inverse[k..k + LANES]);
             let mut total = [0.0; LANES];
-            for p in 0..LANES / S::F64_LANES {
+            for (p, inverse) in inverse.iter().enumerate() {
                 // ν̃, and its sum over the samples before each
                 let mut rest = simd.mul_f64s(simd.splat_f64s(z[0]), wide::<S>(&eight.response[0])[p]);
                 let mut sums = simd.mul_f64s(simd.splat_f64s(z[0]), wide::<S>(&eight.response_before[0])[p]);
@@ -125,7 +125,7 @@ impl<const N: usize> Settled<N> {
                     sums = simd.add_f64s(sums, simd.mul_f64s(x, wide::<S>(&eight.seen_before[j])[p]));
                 }
                 let eta = simd.add_f64s(simd.splat_f64s(drawn), simd.mul_f64s(simd.splat_f64s(gain), sums));
-                let estimate = simd.add_f64s(simd.splat_f64s(before), simd.mul_f64s(eta, inverse[p]));
+                let estimate = simd.add_f64s(simd.splat_f64s(before), simd.mul_f64s(eta, *inverse));
                 let v = simd.sub_f64s(rest, simd.mul_f64s(simd.splat_f64s(s), estimate));
                 wide_mut::<S>(innovation)[p] = v;
                 let square = simd.mul_f64s(simd.mul_f64s(v, v), wide::<S>(weight)[p]);

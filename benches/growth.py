@@ -75,7 +75,7 @@ def main():
             "allan": ["allan", "log.npy"],
             "identify": ["identify", "log.npy", "--model", "white+gm", "-o", "found.json"],
             "replay": ["replay", "filter.json", "log.npy"],
-            "montecarlo": ["montecarlo", "filter.json", "--runs", str(n // 100), "--duration", "10s"],
+            "montecarlo": ["montecarlo", "filter.json", "--runs", str(n // 100), "--duration", "30s"],
             "text": ["replay", "filter.json", "log.csv"],
         }
         for name, command in commands.items():

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from growth import PARAMS
 
-SAMPLES, RUNS, STEPS = 100_000, 200, 1000
+SAMPLES, RUNS, STEPS = 100_000, 200, 3000
 
 
 def instructions(command, folder):
@@ -41,7 +41,7 @@ def main():
         ("montecarlo", ["montecarlo", "filter.json", "--runs", str(RUNS), "--duration", f"{STEPS // 100}s", "--every-step", "every.csv"],
          RUNS * STEPS, "run and step"),
         ("likelihood", ["identify", "log.npy", "--model", "white+gm"], SAMPLES, "sample"),
-        ("text", ["info", "log.csv"], SAMPLES, "row"),
+        ("text", ["replay", "filter.json", "log.csv"], SAMPLES, "row"),
     ]
     print("| road | command | instructions | of each |\n| --- | --- | --- | --- |")
     for name, command, count, unit in roads:

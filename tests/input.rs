@@ -2,6 +2,8 @@
 
 #[path = "input/arrays.rs"]
 mod arrays;
+#[path = "input/batches.rs"]
+mod batches;
 #[path = "input/damage.rs"]
 mod damage;
 #[path = "input/measured.rs"]

@@ -2,7 +2,9 @@
 //!
 //! Format: ArduPilot, libraries/AP_Logger: each message is 0xA3, 0x95, its type and its fields; `FMT` messages say how long the messages
 //! of a type are and what their fields are called. Bytes that are no message are passed over and counted. Units are those of the
-//! message documentation of ArduPilot: rad/s, m/s/s, degC, and time by the name of its field.
+//! message documentation of ArduPilot: rad/s, m/s/s, degC, and time by the name of its field. Batches of raw samples are topics of their own.
+
+mod batch;
 
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
@@ -14,6 +16,7 @@ use super::names::Head;
 use super::number::{Kind, Number, Split};
 use super::records::{Field, Messages, RecordSource, failure, head, instance, tally};
 use super::source::Topic;
+use batch::{Batch, Part};
 
 pub(super) const SIGNATURE: &[u8] = &[0xa3, 0x95, FORMAT];
 
@@ -29,6 +32,7 @@ struct Form {
     fields: Vec<Field>,
     /// The field that tells sensors of one kind apart.
     instance: Option<Field>,
+    batch: Option<Part>,
 }
 
 /// Opens a log and counts what is in it.
@@ -36,8 +40,29 @@ pub(super) fn open(path: &Path) -> Result<RecordSource, InputError> {
     let fail = |what: String| failure(path, &what);
     let mut scanner = Scanner::open(path).map_err(fail)?;
     let mut topics: Vec<Topic> = Vec::new();
+    let (mut batch, mut rows) = (Batch::default(), Vec::new());
     while let Some(kind) = scanner.next().map_err(fail)? {
         let Some(form) = &scanner.forms[usize::from(kind)] else { continue };
+        match form.batch {
+            Some(Part::Header) => {
+                batch.begin(form, &scanner.message);
+                continue;
+            }
+            Some(Part::Data(at)) => {
+                rows.clear();
+                let sensor = batch.samples(form, at, &scanner.message, &mut rows);
+                let Some(sensor) = sensor.filter(|_| !rows.is_empty()) else { continue };
+                let name = sensor.name();
+                let topic = topics.iter().position(|topic| topic.name == name).unwrap_or_else(|| {
+                    topics.push(Topic::new(name, sensor.heads()));
+                    topics.len() - 1
+                });
+                let columns = topics[topic].heads.len();
+                rows.chunks_exact(columns).for_each(|row| tally(&mut topics[topic], row.first().copied(), 1e-6));
+                continue;
+            }
+            None => {}
+        }
         let Some(time) = form.fields.first() else { continue };
         let name = form.topic(&scanner.message);
         let at = topics.iter().position(|topic| topic.name == name).unwrap_or_else(|| {
@@ -55,7 +80,8 @@ pub(super) fn open(path: &Path) -> Result<RecordSource, InputError> {
     let (file, names) = (path.to_path_buf(), topics.iter().map(|topic| topic.name.clone()).collect::<Vec<_>>());
     let messages = move |topic: usize| {
         let scanner = Scanner::open(&file)?;
-        Ok(Box::new(DataflashTopic { scanner, name: names[topic].clone() }) as Box<dyn Messages>)
+        Ok(Box::new(DataflashTopic { scanner, name: names[topic].clone(), batch: Batch::default() })
+            as Box<dyn Messages>)
     };
     let (format, path) = ("ArduPilot DataFlash log", path.to_path_buf());
     Ok(RecordSource { format, path, topics, messages: Box::new(messages) })
@@ -69,7 +95,7 @@ impl Form {
         let name = Bytes::text(bytes.take(4).ok()?);
         let codes = Bytes::text(bytes.take(16).ok()?);
         let labels = Bytes::text(bytes.take(64).ok()?);
-        let (mut fields, mut instance, mut at) = (Vec::new(), None, 0);
+        let (mut fields, mut blocks, mut instance, mut at) = (Vec::<Field>::new(), Vec::new(), None, 0);
         for (code, label) in codes.chars().zip(labels.split(',')) {
             use Kind::{Float, Signed, Unsigned};
             let (kind, factor) = match code {
@@ -91,6 +117,9 @@ impl Form {
                 'L' => (Signed(4), 1e-7),
                 // text, and blocks of numbers
                 'n' | 'N' | 'Z' | 'a' => {
+                    if code == 'a' {
+                        blocks.push((label.to_string(), at));
+                    }
                     at += match code {
                         'n' => 4,
                         'N' => 16,
@@ -108,7 +137,13 @@ impl Form {
             }
             fields.push(field);
         }
-        (at + 3 <= size).then_some((kind, Form { name, size, fields, instance }))
+        let mut form = Form { name, size, fields, instance, batch: None };
+        form.batch = Part::of(&form, &blocks);
+        (at + 3 <= size).then_some((kind, form))
+    }
+
+    fn field(&self, label: &str) -> Option<&Field> {
+        self.fields.iter().find(|field| field.head.full == label)
     }
 
     /// The name of the topic of a message.
@@ -142,16 +177,32 @@ fn column(message: &str, label: &str) -> Head {
 struct DataflashTopic {
     scanner: Scanner,
     name: String,
+    batch: Batch,
 }
 
 impl Messages for DataflashTopic {
     fn rewind(&mut self) -> Result<(), String> {
+        self.batch = Batch::default();
         self.scanner.rewind()
     }
     fn next(&mut self, row: &mut Vec<Split>) -> Result<bool, String> {
         while let Some(kind) = self.scanner.next()? {
             let Some(form) = &self.scanner.forms[usize::from(kind)] else { continue };
-            if self.name.starts_with(&form.name) && form.topic(&self.scanner.message) == self.name {
+            match form.batch {
+                Some(Part::Header) => self.batch.begin(form, &self.scanner.message),
+                Some(Part::Data(at)) => {
+                    let sensor = self.batch.samples(form, at, &self.scanner.message, row);
+                    if sensor.is_some_and(|sensor| sensor.name() == self.name) && !row.is_empty() {
+                        return Ok(true);
+                    }
+                    row.clear();
+                }
+                None => {}
+            }
+            if form.batch.is_none()
+                && self.name.starts_with(&form.name)
+                && form.topic(&self.scanner.message) == self.name
+            {
                 row.extend(form.fields.iter().map(|field| field.decode(&self.scanner.message)));
                 return Ok(true);
             }
@@ -159,7 +210,8 @@ impl Messages for DataflashTopic {
         Ok(false)
     }
     fn damage(&self) -> Option<String> {
-        self.scanner.damage()
+        let of_batches = || self.batch.damage().filter(|_| self.name.starts_with("ISB_"));
+        self.scanner.damage().or_else(of_batches)
     }
 }
 

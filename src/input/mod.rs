@@ -124,11 +124,11 @@ trait Table {
     /// File and place of the names, for messages.
     fn place(&self) -> String;
     fn row_place(&self, line: u64) -> String;
-    /// `beside`: a column behind the axes, in which text is a missing value.
     /// What of the file could not be read, after a pass.
     fn notes(&self) -> Vec<String> {
         Vec::new()
     }
+    /// `beside`: a column behind the axes, in which text is a missing value.
     fn select(&mut self, time: Option<usize>, axes: &[usize], beside: Option<usize>);
     fn rewind(&mut self) -> Result<(), InputError>;
     /// Number of rows, where it is known to be true.

@@ -247,11 +247,11 @@ fn a_log_that_cannot_be_read() {
         ("a cut database", "log.db3", b"SQLite format 3\0".to_vec(), "allan log.db3", &["log.db3: truncated"]),
         ("a cut DataFlash log", "log.bin", b"\xa3\x95\x80\x80".to_vec(), "allan log.bin", &["log.bin: no data"]),
         (
-            "a Parquet file",
+            "a cut Parquet file",
             "log.parquet",
             b"PAR1\x15\0PAR1".to_vec(),
             "allan log.parquet",
-            &["log.parquet: this is a Parquet file"],
+            &["log.parquet: truncated or damaged: its table of contents"],
         ),
         ("nothing to list", "log.bag", b"#ROSBAG V2.0\n".to_vec(), "info log.bag", &["log.bag: no messages"]),
         ("binary file", "log.csv", vec![0, 1, 2, 3, 0, 255], run, &["log.csv: this is a binary file"]),

@@ -12,6 +12,8 @@ mod measured;
 mod messages;
 #[path = "input/npy.rs"]
 mod npy;
+#[path = "input/parquet.rs"]
+mod parquet;
 
 use kfdesign::export::table::TableWriter;
 use kfdesign::input::{self, Block, InputKind, LogOptions, LogReader};

@@ -1,5 +1,9 @@
 //! Little-endian numbers and runs of bytes, never beyond the end.
 
+use std::io::Read;
+
+use ruzstd::decoding::{FrameDecoder, StreamingDecoder};
+
 /// The bytes end before what they declare.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Short;
@@ -38,6 +42,14 @@ impl<'a> Bytes<'a> {
         let end = bytes.iter().position(|b| *b == 0).unwrap_or(bytes.len());
         printable(&bytes[..end])
     }
+}
+
+/// A frame of Zstandard that is to hold about so many bytes: its window, for which room is made at once, may be as large or 8 MiB, which
+/// every decoder has (RFC 8878, section 3.1.1.1.2).
+pub(super) fn zstd(frame: &[u8], size: u64) -> Result<impl Read + '_, String> {
+    let mut decoder = FrameDecoder::new();
+    decoder.set_max_window_size(size.clamp(8 << 20, 128 << 20).next_power_of_two());
+    StreamingDecoder::new_with_decoder(frame, decoder).map_err(|error| format!("no Zstandard frame: {error}"))
 }
 
 /// A name of a binary file: on one line, whatever is in it.

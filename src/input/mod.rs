@@ -11,6 +11,7 @@ mod mcap;
 mod names;
 mod npy;
 mod number;
+mod parquet;
 mod records;
 mod ros;
 mod rosbag;

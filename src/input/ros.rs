@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use super::InputError;
-use super::bytes::{Bytes, Short};
+use super::bytes::{Bytes, Short, zstd};
 use super::names::Head;
 use super::number::Split;
 use super::records::{Messages, RecordSource, failure, head, tally};
@@ -230,7 +230,7 @@ pub(super) fn decompress(compression: &str, data: &[u8], size: u64) -> Result<Ve
         "" | "none" => return Ok(data.to_vec()),
         "bz2" => bzip2::read::BzDecoder::new(data).take(size).read_to_end(&mut out),
         "lz4" => lz4_flex::frame::FrameDecoder::new(data).take(size).read_to_end(&mut out),
-        "zstd" => match ruzstd::decoding::StreamingDecoder::new(data) {
+        "zstd" => match zstd(data, size) {
             Ok(decoder) => decoder.take(size).read_to_end(&mut out),
             Err(error) => return Err(format!("a block compressed with zstd cannot be read ({error})")),
         },

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use super::names::Head;
 use super::{
-    InputError, LogOptions, Table, arrays, columns, dataflash, hdf5, mat, mcap, npy, ros, rosbag, sqlite, text, ulog,
+    InputError, LogOptions, Table, arrays, columns, dataflash, hdf5, mat, mcap, npy, parquet, ros, rosbag, sqlite,
+    text, ulog,
 };
 use crate::units::Quantity;
 
@@ -125,6 +126,9 @@ pub(super) fn open(path: &Path) -> Result<Box<dyn Source>, InputError> {
     }
     if is(dataflash::SIGNATURE) {
         return Ok(Box::new(dataflash::open(path)?));
+    }
+    if is(parquet::SIGNATURE) || is(parquet::ENCRYPTED) {
+        return Ok(Box::new(Single::new("Parquet", Box::new(parquet::ParquetTable::open(path)?))));
     }
     if is(rosbag::SIGNATURE) {
         return Ok(Box::new(ros::open::<rosbag::Rosbag>(path)?));

@@ -277,7 +277,7 @@ fn not_text(bytes: &[u8]) -> Option<String> {
         (b"SQLite format 3", "a database, compressed as a whole"),
         (b"\xa3\x95", "an ArduPilot DataFlash log that does not begin with a message, or is compressed as a whole"),
         (b"H Product:Blackbox", "a Betaflight blackbox log"),
-        (b"PAR1", "a Parquet file"),
+        (b"PAR1", "a Parquet file, compressed as a whole"),
         (b"PK\x03\x04", "a zip archive (npz, xlsx?)"),
         (b"\x28\xb5\x2f\xfd", "compressed with zstd"),
         (b"\x93NUMPY", "a NumPy array, compressed"),
@@ -289,7 +289,7 @@ fn not_text(bytes: &[u8]) -> Option<String> {
         None => return None,
     };
     Some(format!(
-        "this is {what}; text (csv, also .gz), .npy, MATLAB, HDF5, ULog, DataFlash .bin, ROS bags and MCAP are read"
+        "this is {what}; text (csv, also .gz), .npy, MATLAB, HDF5, Parquet, ULog, DataFlash .bin, ROS bags and MCAP are read"
     ))
 }
 

@@ -6,6 +6,8 @@ mod arrays;
 mod batches;
 #[path = "input/damage.rs"]
 mod damage;
+#[path = "input/every_file.rs"]
+mod every_file;
 #[path = "input/measured.rs"]
 mod measured;
 #[path = "input/messages.rs"]
@@ -14,6 +16,8 @@ mod messages;
 mod npy;
 #[path = "input/parquet.rs"]
 mod parquet;
+#[path = "input/vendors.rs"]
+mod vendors;
 
 use kfdesign::export::table::TableWriter;
 use kfdesign::input::{self, Block, InputKind, LogOptions, LogReader};

@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::names::{Head, words};
+use super::names::{Head, is_rate, words};
 use super::number::Split;
 use super::source::{Source, Topic};
 use super::{BLOCK, InputError, Rows, Table};
@@ -137,21 +137,9 @@ impl Source for ArraySource {
 
 /// The sample rate in Hz, if a number of the file is called so.
 fn rate(scalars: &[(String, f64)]) -> Option<(String, f64)> {
-    const NAMES: [&str; 9] = [
-        "samplingrate",
-        "samplerate",
-        "samplingfrequency",
-        "samplefrequency",
-        "samplingratehz",
-        "sampleratehz",
-        "ratehz",
-        "fs",
-        "fshz",
-    ];
     scalars.iter().find_map(|(path, value)| {
         let name = path.rsplit(['/', '.']).next().unwrap_or(path);
-        let plain: String = name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect();
-        (NAMES.contains(&plain.as_str()) && value.is_finite() && *value > 0.0).then(|| (path.clone(), *value))
+        (is_rate(name) && value.is_finite() && *value > 0.0).then(|| (path.clone(), *value))
     })
 }
 

@@ -147,8 +147,10 @@ impl Table<'_> {
             let mut stem = words(&head.name);
             let by_unit = head.unit.as_ref().and_then(|u| quantity_of(u, kind));
             let sensor = sensor_of(&stem);
-            let warm = head.unit.as_ref().is_some_and(|unit| unit.dimension() == Dimension::TEMPERATURE);
-            let excluded = warm || is_excluded(&stem);
+            // the temperature of a gyro, or its stamps
+            let other = [Dimension::TEMPERATURE, Dimension::TIME];
+            let other = head.unit.as_ref().is_some_and(|unit| other.contains(&unit.dimension()));
+            let excluded = other || is_excluded(&stem);
             let Some(quantity) = sensor.or(by_unit).filter(|_| !excluded) else { continue };
             let axis = axis_at(&stem);
             if let Some(at) = axis {
@@ -296,8 +298,12 @@ impl Table<'_> {
             (None, None) if options.rate_hz.is_some() => return Ok(None),
             (None, None) => {
                 let name = &head.full;
+                let or = match self.rate_hz {
+                    Some(rate) => format!("take the {rate} Hz that the file says with --time none"),
+                    None => "give --rate HZ".into(),
+                };
                 return self.fail(format!(
-                    "time column '{name}' has no unit; say it with --time '{name}:s' (or ms, us, ns), or give --rate HZ"
+                    "time column '{name}' has no unit; say it with --time '{name}:s' (or ms, us, ns), or {or}"
                 ));
             }
         };

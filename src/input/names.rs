@@ -127,6 +127,22 @@ const TEMPERATURE_UNITS: [(&str, &str); 8] = [
     ("f", "degF"),
 ];
 const AXIS_WORDS: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];
+/// What the sample rate is called, without separators.
+const RATE_WORDS: [&str; 13] = [
+    "samplingrate",
+    "samplerate",
+    "samplingfrequency",
+    "samplefrequency",
+    "samplingratehz",
+    "sampleratehz",
+    "updaterate",
+    "updateratehz",
+    "outputrate",
+    "outputdatarate",
+    "ratehz",
+    "fs",
+    "fshz",
+];
 /// Columns that are about a sensor but are not its output.
 const NOT_A_SENSOR: [&str; 20] = [
     "truth",
@@ -191,6 +207,12 @@ impl Head {
         self.unit = Unit::parse(of_temperature().unwrap_or(unit)).ok();
         self.unit_text = Some(unit.trim().to_string());
     }
+}
+
+/// The name of a sample rate.
+pub(super) fn is_rate(name: &str) -> bool {
+    let plain: String = name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect();
+    RATE_WORDS.contains(&plain.as_str())
 }
 
 /// `%float(RawGyroX)` is `RawGyroX`.

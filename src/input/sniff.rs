@@ -1,6 +1,6 @@
 //! What a text log looks like: delimiter, decimal sign, header, first row of numbers; found from the beginning of the file.
 
-use super::names::Head;
+use super::names::{Head, is_rate};
 
 /// How the fields of a line are separated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,6 +22,8 @@ pub(super) struct Layout {
     pub(super) header_line: u64,
     /// 1-based line from which on every line is a row of numbers, a comment or blank.
     pub(super) first_line: u64,
+    /// The sample rate in Hz that a line before the table says, and what it calls it.
+    pub(super) rate: Option<(String, f64)>,
 }
 
 /// Fields of one line: trimmed, quotes taken off.
@@ -249,6 +251,7 @@ fn describe(
         named: false,
         header_line: 0,
         first_line: table[0].number,
+        rate: None,
     };
     if is_header {
         layout.heads = names(table[0].text);
@@ -276,7 +279,24 @@ fn describe(
             layout.header_line = comment.number;
         }
     }
+    let before = comments.iter().filter(|line| line.number < layout.first_line).chain(&body[..start]);
+    layout.rate = before.filter_map(|line| said_rate(&String::from_utf8_lossy(line.text))).next();
     Ok(layout)
+}
+
+/// `// Update Rate: 100.0Hz`, `Sample rate (Hz),100`: only in hertz, and only where it says so.
+fn said_rate(line: &str) -> Option<(String, f64)> {
+    let (name, value) = line.trim_matches(|c: char| "#%/\" \t".contains(c)).split_once([':', '=', ',', ';', '\t'])?;
+    let (name, value) = (name.trim_matches([' ', '"']), value.trim_matches([' ', '"', ',', ';', '\t']));
+    let lower = value.to_ascii_lowercase();
+    let number = match lower.strip_suffix("hz") {
+        Some(number) => number.trim_end(),
+        None if name.to_ascii_lowercase().trim_end_matches([')', ']']).ends_with("hz") => &lower,
+        None => return None,
+    };
+    let stem = name.split(['(', '[']).next().unwrap_or(name);
+    let rate = number.parse::<f64>().ok().filter(|rate| rate.is_finite() && *rate > 0.0)?;
+    (is_rate(name) || is_rate(stem)).then(|| (name.to_string(), rate))
 }
 
 /// Units or nothing in every cell.

@@ -205,6 +205,9 @@ impl Table for TextTable {
     fn named(&self) -> bool {
         self.layout.named
     }
+    fn rate(&self) -> Option<(String, f64)> {
+        self.layout.rate.clone()
+    }
     fn place(&self) -> String {
         match self.layout.header_line {
             0 => format!("{}: line {}", self.path.display(), self.layout.first_line),
@@ -268,7 +271,7 @@ impl Table for TextTable {
 
 /// Why this is no text log, if the first bytes say so.
 fn not_text(bytes: &[u8]) -> Option<String> {
-    const KNOWN: [(&[u8], &str); 12] = [
+    const KNOWN: [(&[u8], &str); 14] = [
         (b"\x89HDF", "an HDF5 file, compressed as a whole"),
         (b"MATLAB ", "a MATLAB file, compressed as a whole"),
         (b"ULog\x01\x12\x35", "a PX4 ULog, compressed as a whole"),
@@ -276,8 +279,10 @@ fn not_text(bytes: &[u8]) -> Option<String> {
         (b"\x89MCAP", "an MCAP file, compressed as a whole"),
         (b"SQLite format 3", "a database, compressed as a whole"),
         (b"\xa3\x95", "an ArduPilot DataFlash log that does not begin with a message, or is compressed as a whole"),
-        (b"H Product:Blackbox", "a Betaflight blackbox log"),
+        (b"H Product:Blackbox", "a Betaflight blackbox log, of which blackbox_decode makes a csv"),
         (b"PAR1", "a Parquet file, compressed as a whole"),
+        (b"rosbag2_bagfile_information", "the description of a ROS 2 bag, not the bag: give the folder it lies in"),
+        (b"{", "a JSON document"),
         (b"PK\x03\x04", "a zip archive (npz, xlsx?)"),
         (b"\x28\xb5\x2f\xfd", "compressed with zstd"),
         (b"\x93NUMPY", "a NumPy array, compressed"),

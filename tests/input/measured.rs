@@ -168,7 +168,8 @@ fn measured_logs_agree_with_an_independent_reader() {
         },
         Measured {
             path: "formats/text/skinematics_data_xsens.txt",
-            flags: &[("rate", "50"), ("unit", "rad/s")],
+            // the rate stands in the header
+            flags: &[("unit", "rad/s")],
             samples: 953,
             rate_hz: 50.0,
             base: Given,
@@ -317,7 +318,9 @@ fn the_check_finds_the_known_defects_of_measured_logs() {
 fn measured_logs_that_are_refused_say_why() {
     let gyro: Flags =
         &[("columns", "IMU::UncompGyro::X,IMU::UncompGyro::Y,IMU::UncompGyro::Z"), ("time", "Time::TimeStartup")];
-    let table: [(&str, Flags, &str); 6] = [
+    let table: [(&str, Flags, &str); 8] = [
+        ("formats/rosbag2/imu_tools_sparkfun_razor/metadata.yaml", &[], "give the folder it lies in"),
+        ("motion/mad-lab-fau_imucal/example_ferraris_session_list.json", &[], "this is a JSON document"),
         ("static/UniStuttgart-INS_INSTINCT/2023-08-15_Multi-IMU_static60s.txt", &[], "no header names the 12 columns"),
         ("static/UniStuttgart-INS_INSTINCT/vn310-imu.csv", &[], "'IMU::AngularRate::X'"),
         (
@@ -331,7 +334,11 @@ fn measured_logs_that_are_refused_say_why() {
             &[],
             "line 6282: time goes back",
         ),
-        ("formats/betaflight/blackbox-library_normal.bfl", &[], "this is a Betaflight blackbox log"),
+        (
+            "formats/betaflight/blackbox-library_normal.bfl",
+            &[],
+            "this is a Betaflight blackbox log, of which blackbox_decode makes a csv",
+        ),
     ];
     for (path, flags, words) in table {
         let Some(path) = measured(path) else { return };

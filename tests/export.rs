@@ -5,7 +5,7 @@ use kfdesign::numerics::random::{StreamId, normal, stream};
 use kfdesign::params::AxisParams;
 use kfdesign::units::Unit;
 
-use super::support::Bench;
+use super::support::{Bench, measured};
 
 /// The reference sensor: N = 0.0562 deg/s/√Hz, σ = 0.0280596 deg/s, Tc = 193.9312 s at 100 Hz.
 const GYRO: &str = r#"{"format": "kfdesign-params/1", "quantity": "angular-rate", "sample_rate": "100 Hz",
@@ -335,4 +335,37 @@ fn choices_are_said_in_the_file() {
         let line = out.stderr.lines().last().unwrap_or_default();
         assert!(out.status == 2 && line.starts_with("kfdesign: ") && line.contains(words), "{args}: {}", out.stderr);
     }
+}
+
+/// The commands of docs/ulog-to-ekf2.md on the real log, and the parameters that the page shows.
+#[test]
+fn the_story_from_a_ulog_to_ekf2_is_true() {
+    let Some(log) = measured("formats/ulog/pyulog_sample.ulg") else { return };
+    let page =
+        std::fs::read_to_string(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/ulog-to-ekf2.md")).unwrap();
+    let bench = Bench::new();
+    std::fs::copy(log, bench.path("sample.ulg")).unwrap();
+    let story = page.split("## Why not").next().unwrap();
+    for line in story.lines().filter_map(|line| line.strip_prefix("$ kfdesign ")) {
+        bench.ok(line);
+    }
+    let written = bench.read("ekf2.params");
+    let shown: Vec<&str> = page.lines().filter(|line| line.starts_with("1\t1\t")).take(4).collect();
+    let found: Vec<&str> = written.lines().filter(|line| line.starts_with("1\t1\t")).collect();
+    assert_eq!(
+        found.iter().map(|line| line.split('\t').nth(2)).collect::<Vec<_>>(),
+        shown.iter().map(|line| line.split('\t').nth(2)).collect::<Vec<_>>()
+    );
+    for (found, shown) in found.iter().zip(shown) {
+        let number = |line: &str| line.split('\t').nth(3).unwrap().parse::<f64>().unwrap();
+        // a fit: another machine rounds otherwise
+        assert!((number(found) / number(shown) - 1.0).abs() < 1e-4, "{found}: {shown}");
+    }
+    // 5.88e-5 rad/s/sqrt(Hz) over sqrt(10 ms)
+    assert!((number_of(&written, "EKF2_GYR_NOISE") / 5.88e-4 - 1.0).abs() < 1e-3);
+}
+
+fn number_of(params: &str, name: &str) -> f64 {
+    let line = params.lines().find(|line| line.split('\t').nth(2) == Some(name)).unwrap();
+    line.split('\t').nth(3).unwrap().parse().unwrap()
 }

@@ -14,7 +14,7 @@ use super::InputError;
 use super::bytes::Bytes;
 use super::names::Head;
 use super::number::{Kind, Number, Split};
-use super::records::{Field, Messages, RecordSource, failure, head, instance, tally};
+use super::records::{Field, Messages, PassedOver, RecordSource, failure, head, instance, opened, tally};
 use super::source::Topic;
 use batch::{Batch, Part};
 
@@ -225,25 +225,21 @@ struct Scanner {
     window: Vec<u8>,
     at: usize,
     forms: Vec<Option<Form>>,
-    passed_over: u64,
-    first_damage: Option<u64>,
+    passed_over: PassedOver,
     message: Vec<u8>,
 }
 
 impl Scanner {
     fn open(path: &Path) -> Result<Scanner, String> {
-        let io = |error: std::io::Error| format!("cannot read: {error}");
-        let file = File::open(path).map_err(io)?;
-        let length = file.metadata().map_err(io)?.len();
+        let (reader, length) = opened(path)?;
         let mut scanner = Scanner {
-            reader: BufReader::with_capacity(1 << 16, file),
+            reader,
             length,
             read: 0,
             window: Vec::new(),
             at: 0,
             forms: Vec::new(),
-            passed_over: 0,
-            first_damage: None,
+            passed_over: PassedOver::default(),
             message: Vec::new(),
         };
         scanner.rewind()?;
@@ -253,14 +249,13 @@ impl Scanner {
     fn rewind(&mut self) -> Result<(), String> {
         self.reader.seek(SeekFrom::Start(0)).map_err(|error| format!("cannot read: {error}"))?;
         self.window.clear();
-        (self.at, self.read, self.passed_over, self.first_damage) = (0, 0, 0, None);
+        (self.at, self.read, self.passed_over) = (0, 0, PassedOver::default());
         self.forms = vec![None; 256];
         Ok(())
     }
 
     fn damage(&self) -> Option<String> {
-        let first = self.first_damage?;
-        Some(format!("damaged at byte {first}: {} of {} bytes were passed over", self.passed_over, self.length))
+        self.passed_over.sentence(self.length)
     }
 
     /// At least `count` bytes in the window, if the file has them.
@@ -314,8 +309,7 @@ impl Scanner {
 
     fn pass_over(&mut self, bytes: usize) {
         if bytes > 0 {
-            self.first_damage.get_or_insert(self.read + self.at as u64);
-            self.passed_over += bytes as u64;
+            self.passed_over.count(self.read + self.at as u64, bytes as u64);
             self.at += bytes;
         }
     }

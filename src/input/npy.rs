@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use self::header::Header;
 use super::names::Head;
-use super::number::Number;
+use super::number::{Number, since};
 use super::{BLOCK, InputError, Rows, Table};
 
 /// More columns are a transposed array.
@@ -135,13 +135,7 @@ impl Table for NpyTable {
         if let Some(column) = self.time {
             self.fetch(column, count as usize)?;
             let mut origin = self.origin;
-            for (whole, fraction) in self.values(column) {
-                let first = match origin {
-                    None if fraction.is_finite() => *origin.insert((whole, fraction)),
-                    known => known.unwrap_or((0, 0.0)),
-                };
-                rows.time.push((whole - first.0) as f64 + (fraction - first.1));
-            }
+            rows.time.extend(self.values(column).map(|stamp| since(&mut origin, stamp)));
             self.origin = origin;
         }
         for axis in 0..self.axes.len() {

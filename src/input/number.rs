@@ -3,6 +3,16 @@
 /// Whole and fraction apart, so that nanoseconds since 1970 keep their last digits.
 pub(super) type Split = (i128, f64);
 
+/// A stamp since the first one that is a number.
+pub(super) fn since(origin: &mut Option<Split>, stamp: Split) -> f64 {
+    let (whole, part) = stamp;
+    let first = match *origin {
+        None if part.is_finite() => *origin.insert(stamp),
+        known => known.unwrap_or((0, 0.0)),
+    };
+    (whole - first.0) as f64 + (part - first.1)
+}
+
 /// How one number is stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Number {

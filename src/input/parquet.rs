@@ -20,7 +20,7 @@ use parquet::schema::types::ColumnDescriptor;
 use self::pages::Pages;
 use super::bytes::printable;
 use super::names::Head;
-use super::number::{Kind, Number, Split};
+use super::number::{Kind, Number, Split, since};
 use super::{BLOCK, InputError, Rows, Table};
 
 pub(super) const SIGNATURE: &[u8] = b"PAR1";
@@ -186,15 +186,7 @@ impl Table for ParquetTable {
                 return self.fail(&format!("{} has fewer rows than it declares", name(&descriptor)));
             }
             match (self.time, i) {
-                (Some(_), 0) => {
-                    for (whole, part) in numbers.iter().copied() {
-                        let first = match self.origin {
-                            None if part.is_finite() => *self.origin.insert((whole, part)),
-                            known => known.unwrap_or((0, 0.0)),
-                        };
-                        rows.time.push((whole - first.0) as f64 + (part - first.1));
-                    }
-                }
+                (Some(_), 0) => rows.time.extend(numbers.iter().map(|stamp| since(&mut self.origin, *stamp))),
                 (time, i) => {
                     let values = numbers.iter().map(|(whole, part)| *whole as f64 + part);
                     rows.values[i - usize::from(time.is_some())]

@@ -1,9 +1,11 @@
 //! Logs of messages: flight logs and bags. The fields of one kind of message are the columns of one table.
 
+use std::fs::File;
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use super::names::Head;
-use super::number::{Number, Split};
+use super::number::{Number, Split, since};
 use super::source::{Source, Topic};
 use super::{BLOCK, InputError, Rows, Table};
 use crate::units::Unit;
@@ -60,6 +62,33 @@ pub(super) fn head(full: &str, name: &str, unit: Option<&str>) -> Head {
 /// The name of a topic of which there may be several.
 pub(super) fn instance(name: &str, instance: u64) -> String {
     format!("{name}:{instance}")
+}
+
+/// A file that is read from the beginning, and its length.
+pub(super) fn opened(path: &Path) -> Result<(BufReader<File>, u64), String> {
+    let io = |error: std::io::Error| format!("cannot read: {error}");
+    let file = File::open(path).map_err(io)?;
+    let length = file.metadata().map_err(io)?.len();
+    Ok((BufReader::with_capacity(1 << 16, file), length))
+}
+
+/// Bytes of a file that are no message.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct PassedOver {
+    first: Option<u64>,
+    bytes: u64,
+}
+
+impl PassedOver {
+    pub(super) fn count(&mut self, at: u64, bytes: u64) {
+        self.first.get_or_insert(at);
+        self.bytes += bytes;
+    }
+    /// What to say of it, of a file of so many bytes.
+    pub(super) fn sentence(&self, length: u64) -> Option<String> {
+        let first = self.first?;
+        Some(format!("damaged at byte {first}: {} of {length} bytes were passed over", self.bytes))
+    }
 }
 
 /// What the first pass counts of a topic.
@@ -164,12 +193,7 @@ impl Table for RecordTable {
                 self.at += 1;
                 rows.lines.push(self.at);
                 if let Some(column) = self.time {
-                    let (whole, part) = row[column];
-                    let first = match self.origin {
-                        None if part.is_finite() => *self.origin.insert((whole, part)),
-                        known => known.unwrap_or((0, 0.0)),
-                    };
-                    rows.time.push((whole - first.0) as f64 + (part - first.1));
+                    rows.time.push(since(&mut self.origin, row[column]));
                 }
                 for (values, &column) in rows.values.iter_mut().zip(&self.axes) {
                     let (whole, part) = row[column];

@@ -12,7 +12,7 @@ use std::path::Path;
 use super::InputError;
 use super::bytes::Bytes;
 use super::number::{Kind, Number, Split};
-use super::records::{Field, Messages, RecordSource, failure, head, instance, tally};
+use super::records::{Field, Messages, PassedOver, RecordSource, failure, head, instance, opened, tally};
 use super::source::Topic;
 
 pub(super) const SIGNATURE: &[u8] = b"ULog\x01\x12\x35";
@@ -306,23 +306,19 @@ struct Scanner {
     length: u64,
     /// Where sections begin that were appended later: a message before may be cut there.
     appended: VecDeque<u64>,
-    passed_over: u64,
-    first_damage: Option<u64>,
+    passed_over: PassedOver,
     message: Vec<u8>,
 }
 
 impl Scanner {
     fn open(path: &Path) -> Result<Scanner, String> {
-        let io = |error: std::io::Error| format!("cannot read: {error}");
-        let file = File::open(path).map_err(io)?;
-        let length = file.metadata().map_err(io)?.len();
+        let (reader, length) = opened(path)?;
         let mut scanner = Scanner {
-            reader: BufReader::with_capacity(1 << 16, file),
+            reader,
             at: 0,
             length,
             appended: VecDeque::new(),
-            passed_over: 0,
-            first_damage: None,
+            passed_over: PassedOver::default(),
             message: Vec::new(),
         };
         scanner.rewind()?;
@@ -331,7 +327,7 @@ impl Scanner {
 
     fn rewind(&mut self) -> Result<(), String> {
         self.appended.clear();
-        (self.passed_over, self.first_damage) = (0, None);
+        self.passed_over = PassedOver::default();
         self.jump(16)
     }
 
@@ -342,8 +338,7 @@ impl Scanner {
     }
 
     fn damage(&self) -> Option<String> {
-        let first = self.first_damage?;
-        Some(format!("damaged at byte {first}: {} of {} bytes were passed over", self.passed_over, self.length))
+        self.passed_over.sentence(self.length)
     }
 
     /// The kind of the next message, whose content is in `message`.
@@ -375,7 +370,6 @@ impl Scanner {
             if self.at >= self.length {
                 return Ok(None);
             }
-            self.first_damage.get_or_insert(self.at);
             if !self.resynchronise()? {
                 return Ok(None);
             }
@@ -401,7 +395,7 @@ impl Scanner {
         loop {
             let buffer = self.reader.fill_buf().map_err(|error| format!("cannot read on: {error}"))?;
             if buffer.is_empty() {
-                self.passed_over += self.length - from;
+                self.passed_over.count(from, self.length - from);
                 self.at = self.length;
                 return Ok(false);
             }
@@ -416,7 +410,7 @@ impl Scanner {
             at += used as u64;
             self.reader.consume(used);
             if matched == SYNC.len() {
-                self.passed_over += at - from;
+                self.passed_over.count(from, at - from);
                 self.at = at;
                 while self.appended.front().is_some_and(|&next| next < at) {
                     self.appended.pop_front();

@@ -292,7 +292,7 @@ fn whole(args: &Args, choice: &ModelChoice, options: &LogOptions) -> anyhow::Res
     }
     let warmth = temperature::Warmth::new(&readings, options.kind);
     let bar = progress(parts.len() as u64, "identify");
-    let axes: Vec<(Axis, Option<String>)> = parts
+    let axes: Vec<Axis> = parts
         .into_par_iter()
         .map(|part| {
             let axis = identify(part, dt, args, choice, &log, warmth.as_ref());
@@ -301,14 +301,12 @@ fn whole(args: &Args, choice: &ModelChoice, options: &LogOptions) -> anyhow::Res
         })
         .collect::<anyhow::Result<_>>()?;
     bar.finish_and_clear();
-    let mut all = Vec::with_capacity(axes.len());
-    for (axis, note) in axes {
+    for AxisCurve { name, note, .. } in axes.iter().map(|axis| &axis.measured) {
         if let Some(note) = note {
-            eprintln!("  note: {}: {note}", axis.measured.name);
+            eprintln!("  note: {name}: {note}");
         }
-        all.push(axis);
     }
-    Ok((log, all))
+    Ok((log, axes))
 }
 
 fn file_name(path: &Path) -> String {
@@ -346,7 +344,7 @@ fn by_axis(logs: &[PathBuf], readings: &[(Recording, LogCheck)], kind: InputKind
     Ok(all)
 }
 
-/// `parts`: the stretches of one axis, one per log. With what is to be said of what was left out.
+/// `parts`: the stretches of one axis, one per log.
 fn identify(
     mut parts: Vec<Stretch>,
     dt: f64,
@@ -354,7 +352,7 @@ fn identify(
     choice: &ModelChoice,
     log: &Log,
     warmth: Option<&temperature::Warmth>,
-) -> anyhow::Result<(Axis, Option<String>)> {
+) -> anyhow::Result<Axis> {
     // the first of the longest
     let longest = (0..parts.len()).rev().max_by_key(|i| parts[*i].rate.len()).unwrap_or(0);
     let upsets = upset_words(&parts[longest], dt, args.robust);
@@ -375,10 +373,10 @@ fn identify(
     log.warn_of_motion(&part.name, &mut found);
     let part = parts.swap_remove(longest);
     let (curve, fit) = (found.curve.clone(), Ok(found.model.clone()));
-    let measured = AxisCurve { name: part.name.clone(), unit: part.unit.clone(), note: None, curve, fit };
     let role = if method == Method::Likelihood { "chooses the terms" } else { "is used" };
     let note = part.left_out_note(role);
-    Ok((Axis { measured, samples: part.rate.len(), left_out: part.left_out, found, warmth }, note))
+    let measured = AxisCurve { name: part.name.clone(), unit: part.unit.clone(), note, curve, fit };
+    Ok(Axis { measured, samples: part.rate.len(), left_out: part.left_out, found, warmth })
 }
 
 /// What is in the log that no model of noise has.

@@ -15,6 +15,21 @@ macro_rules! for_size {
     };
 }
 
+/// Calls a generic method with a size from 0 to 6 known to the compiler; more is 6.
+macro_rules! with_size {
+    ($n:expr, $own:ident.$method:ident($($argument:expr),*)) => {
+        match $n {
+            0 => $own.$method::<0>($($argument),*),
+            1 => $own.$method::<1>($($argument),*),
+            2 => $own.$method::<2>($($argument),*),
+            3 => $own.$method::<3>($($argument),*),
+            4 => $own.$method::<4>($($argument),*),
+            5 => $own.$method::<5>($($argument),*),
+            _ => $own.$method::<6>($($argument),*),
+        }
+    };
+}
+
 pub mod attitude;
 pub mod constant_gain;
 pub mod cycle;

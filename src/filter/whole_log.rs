@@ -22,7 +22,7 @@ use crate::model::LinearModel;
 
 /// Innovations of a log of the first measurement of `model`, one at every step; inputs are zero, other measurements are not taken.
 ///
-/// Writes ν = z − H x(k|k−1) and ν²/S of every sample (NaN where it is not a finite number; the filter predicts over it) and hands back
+/// Writes ν = z − H x(k|k−1) and ν²/S of every sample (NaN where it is not a number below 1e140; the filter predicts over it) and hands back
 /// ln L = Σ −½ (ln 2πS + ν²/S). SI units. Panics when the three lists differ in length.
 ///
 /// A model with at most six states beside the bias runs at the speed of its settled gains; others, and those that take their measurement
@@ -65,7 +65,7 @@ pub fn carried(model: &LinearModel, z: &[f64], innovation: &mut [f64], weight: &
                     kalman.predict();
                 }
                 (innovation[k], weight[k]) = (f64::NAN, f64::NAN);
-                if k % every == 0 && z.is_finite() {
+                if k % every == 0 && usable(*z) {
                     let update = kalman.update(0, *z, None);
                     (innovation[k], weight[k]) = (update.innovation, 1.0 / update.variance);
                     log_likelihood += update.log_likelihood();
@@ -93,6 +93,7 @@ impl<const N: usize> NullaryFnOnce for Carried<'_, N> {
         let (h, r) = (std::array::from_fn(|i| model.h[(0, i)]), model.r[(0, 0)]);
         let (mut x, mut p) = (std::array::from_fn(|i| model.x0[i]), square::<N>(model.p0.as_slice()));
         let (mut log_variance, mut nis, mut count, mut started) = (0.0, 0.0, 0_u64, false);
+        let inverse_r = if r > 0.0 { 1.0 / r } else { 1.0 };
         let parts = z.chunks(LOOK).zip(innovation.chunks_mut(LOOK)).zip(weight.chunks_mut(LOOK));
         for ((z, innovation), weight) in parts {
             let mut product = 1.0;
@@ -102,21 +103,27 @@ impl<const N: usize> NullaryFnOnce for Carried<'_, N> {
                 }
                 started = true;
                 (*innovation, *weight) = (f64::NAN, f64::NAN);
-                if z.is_finite() {
+                if usable(*z) {
                     let update = update_fixed(&h, r, *z, f64::INFINITY, &mut x, &mut p);
                     (*innovation, *weight) = (update.innovation, 1.0 / update.variance);
-                    product *= update.variance;
+                    product *= update.variance * inverse_r;
                     nis += update.nis;
                     count += 1;
                 }
             }
             log_variance += product.ln();
         }
-        -0.5 * (count as f64 * std::f64::consts::TAU.ln() + log_variance + nis)
+        -0.5 * (count as f64 * (std::f64::consts::TAU / inverse_r).ln() + log_variance + nis)
     }
 }
 
-/// The states that are not the bias: most that are kept in registers.
+/// A measurement that can be used: the square of a larger one is no number.
+#[inline(always)]
+fn usable(z: f64) -> bool {
+    z.abs() < 1e140
+}
+
+/// The states that are not the bias: most that are kept in registers, and that `with_size!` knows.
 const MOST: usize = 6;
 /// Samples whose results stay in the nearest caches until they are used again.
 const PIECE: usize = 8192;
@@ -126,6 +133,8 @@ const PIECE: usize = 8192;
 pub struct TwoStage {
     /// The filter without the bias.
     rest: Kalman,
+    /// For what the bias does over a gap.
+    whole: Kalman,
     f: DMatrix<f64>,
     q: DMatrix<f64>,
     h: DVector<f64>,
@@ -152,10 +161,10 @@ pub struct TwoStage {
 }
 
 impl TwoStage {
-    /// `None` for a model that it cannot run: more than six states beside the bias, or a measurement that is not taken at every step.
+    /// `None` for a model that it cannot run: more than six states beside the bias, or a measurement that is not taken at every step or has no noise.
     pub fn new(model: &LinearModel) -> Option<TwoStage> {
         let n = model.x0.len();
-        if model.every.first() != Some(&1) {
+        if model.every.first() != Some(&1) || model.r[(0, 0)].is_nan() || model.r[(0, 0)] <= 0.0 {
             return None;
         }
         let constant = |i: &usize| {
@@ -187,27 +196,20 @@ impl TwoStage {
             bias: bias.map_or(0.0, |b| model.x0[b]),
             information: bias.map_or(f64::INFINITY, |b| 1.0 / model.p0[(b, b)]),
             rest: Kalman::new(&rest),
+            whole: Kalman::new(model),
             log_variance: 0.0,
             nis: 0.0,
             count: 0,
         })
     }
 
-    /// The next samples: ν and 1/S of each, NaN where it is not a finite number. Afterwards the state is that after the last.
+    /// The next samples: ν and 1/S of each, NaN where it is not a number below 1e140. Afterwards the state is that after the last.
     pub fn run(&mut self, z: &[f64], innovation: &mut [f64], weight: &mut [f64]) {
         let mut at = 0;
         while at < z.len() {
             if self.started && !self.still {
                 let (z, innovation, weight) = (&z[at..], &mut innovation[at..], &mut weight[at..]);
-                let came = match self.h.len() {
-                    0 => self.approach::<0>(z, innovation, weight),
-                    1 => self.approach::<1>(z, innovation, weight),
-                    2 => self.approach::<2>(z, innovation, weight),
-                    3 => self.approach::<3>(z, innovation, weight),
-                    4 => self.approach::<4>(z, innovation, weight),
-                    5 => self.approach::<5>(z, innovation, weight),
-                    _ => self.approach::<MOST>(z, innovation, weight),
-                };
+                let came = with_size!(self.h.len(), self.approach(z, innovation, weight));
                 at += came;
                 if came > 0 {
                     continue;
@@ -217,7 +219,7 @@ impl TwoStage {
                 self.predict();
             }
             self.started = true;
-            if !z[at].is_finite() {
+            if !usable(z[at]) {
                 (innovation[at], weight[at]) = (f64::NAN, f64::NAN);
                 self.still = false;
                 at += 1;
@@ -225,21 +227,13 @@ impl TwoStage {
             }
             // the last sample of a stretch is not among the settled, so that the state is that after it
             let end = if self.still {
-                z[at..].iter().position(|z| !z.is_finite()).map_or(z.len(), |bad| at + bad) - 1
+                z[at..].iter().position(|z| !usable(*z)).map_or(z.len(), |bad| at + bad) - 1
             } else {
                 at
             };
             if end > at {
                 let (z, innovation, weight) = (&z[at..end], &mut innovation[at..end], &mut weight[at..end]);
-                match self.h.len() {
-                    0 => self.settled::<0>(z, innovation, weight),
-                    1 => self.settled::<1>(z, innovation, weight),
-                    2 => self.settled::<2>(z, innovation, weight),
-                    3 => self.settled::<3>(z, innovation, weight),
-                    4 => self.settled::<4>(z, innovation, weight),
-                    5 => self.settled::<5>(z, innovation, weight),
-                    _ => self.settled::<MOST>(z, innovation, weight),
-                }
+                with_size!(self.h.len(), self.settled(z, innovation, weight));
                 at = end;
             }
             (innovation[at], weight[at]) = self.update(z[at]);
@@ -254,17 +248,15 @@ impl TwoStage {
         std::mem::swap(&mut self.answer, &mut self.spare);
     }
 
-    /// Steps without a sample; cost grows with their logarithm, and with their number where the bias drives other states.
+    /// Steps without a sample; cost grows with their logarithm.
     pub fn pause(&mut self, steps: u64) {
-        if self.couple.iter().all(|f| *f == 0.0) {
-            let mut carrier = self.rest.clone();
-            carrier.x.copy_from(&self.answer);
-            carrier.predict_many(steps);
-            self.answer.copy_from(&carrier.x);
-            self.rest.predict_many(steps);
-        } else {
-            (0..steps).for_each(|_| self.predict());
+        if let Some(place) = self.place {
+            // the states that follow a bias of one
+            self.whole.x = self.answer.clone().insert_row(place, 1.0);
+            self.whole.predict_many(steps);
+            self.answer = self.whole.x.clone().remove_row(place);
         }
+        self.rest.predict_many(steps);
         self.still = false;
     }
 

@@ -1,11 +1,12 @@
 //! Runs by number, on all threads.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use rayon::prelude::*;
 
 use super::course::AxisCourse;
-use super::lanes::{LANES, Lane, Observer, Scratch, Truth, simulate};
+use super::lanes::{LANES, Lane, Observer, Runs, Scratch, Truth, simulate};
 use super::sums::Totals;
 
 /// Steps (of all runs and axes) between two looks at the clock and at a request to stop.
@@ -56,7 +57,8 @@ impl Course {
         progress: &(dyn Fn(u64) + Sync),
     ) {
         let scratch = scratch.get_or_insert_with(|| Scratch::new(&self.axes[number as usize]));
-        self.runs_of(number, first, scratch);
+        let eight = self.from(number, first, scratch);
+        simulate(&self.axes[number as usize], eight, scratch, None);
         let used = (runs.end - first).min(LANES as u64);
         for (values, counts) in scratch.values.iter().zip(&scratch.counts).take(used as usize) {
             totals.add(values, counts);
@@ -65,12 +67,15 @@ impl Course {
     }
 
     /// The eight runs from `first` on, of one axis.
-    pub(super) fn runs_of(&self, number: u32, first: u64, scratch: &mut Scratch) {
+    /// `first` and the seven runs after it, at their start.
+    pub(super) fn from(&self, number: u32, first: u64, scratch: &mut Scratch) -> Runs<'_> {
+        self.start(number, std::array::from_fn(|l| first.saturating_add(l as u64)), scratch)
+    }
+
+    fn start(&self, number: u32, runs: [u64; LANES], scratch: &mut Scratch) -> Runs<'_> {
         let axis = &self.axes[number as usize];
-        let numbers: [u64; LANES] = std::array::from_fn(|l| first.saturating_add(l as u64));
-        let drawn = self.drawn(number, numbers);
-        let truth = drawn.as_ref().unwrap_or(&axis.nominal);
-        simulate(axis, number, truth, self.seed, numbers, scratch, None);
+        let model = self.drawn(number, runs).map_or(Cow::Borrowed(&axis.nominal), Cow::Owned);
+        Runs::new(axis, number, model, self.seed, runs, scratch)
     }
 
     /// The truths of these runs, where every run has its own.
@@ -110,10 +115,8 @@ impl Course {
     pub fn trace(&self, run: u64) -> Vec<Trace> {
         let one = |number: u32, axis: &AxisCourse| {
             let mut trace = Trace::new(axis, self.steps);
-            let numbers = [run; LANES];
-            let drawn = self.drawn(number, numbers);
-            let truth = drawn.as_ref().unwrap_or(&axis.nominal);
-            simulate(axis, number, truth, self.seed, numbers, &mut Scratch::new(axis), Some(&mut trace));
+            let mut scratch = Scratch::new(axis);
+            simulate(axis, self.start(number, [run; LANES], &mut scratch), &mut scratch, Some(&mut trace));
             trace
         };
         (0..).zip(&self.axes).map(|(number, axis)| one(number, axis)).collect()
@@ -123,10 +126,8 @@ impl Course {
     pub fn paths(&self, first: u64, every: u64) -> Vec<Vec<Path>> {
         let one = |number: u32, axis: &AxisCourse| {
             let mut paths = Paths { every: every.max(1), runs: std::array::from_fn(|_| Path::new(axis)) };
-            let numbers: [u64; LANES] = std::array::from_fn(|l| first.saturating_add(l as u64));
-            let drawn = self.drawn(number, numbers);
-            let truth = drawn.as_ref().unwrap_or(&axis.nominal);
-            simulate(axis, number, truth, self.seed, numbers, &mut Scratch::new(axis), Some(&mut paths));
+            let mut scratch = Scratch::new(axis);
+            simulate(axis, self.from(number, first, &mut scratch), &mut scratch, Some(&mut paths));
             Vec::from(paths.runs)
         };
         (0..).zip(&self.axes).map(|(number, axis)| one(number, axis)).collect()

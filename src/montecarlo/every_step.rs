@@ -3,10 +3,12 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use pulp::Arch;
 use rayon::prelude::*;
 
 use super::course::{AxisCourse, Channel};
 use super::engine::Course;
+use super::kernels::{AddSquares, Stretch};
 use super::lanes::{Aligned, CHUNK, ChannelSums, LANES, Lane, Scratch};
 use crate::filter::Kalman;
 use crate::filter::judge::Judge;
@@ -43,22 +45,29 @@ impl EveryStep {
 
 /// What the inner loop needs to judge errors at every step, and what it adds up.
 pub(super) struct Judged {
-    /// Per step W A, then W B, by rows, with W the whitening of the claimed covariance of e = A x − B x̂.
-    pub(super) whiten: Arc<[f64]>,
-    pub(super) components: usize,
-    /// Of the steps of a chunk, each lane.
-    pub(super) nees: Aligned,
+    whiten: Arc<Whitening>,
+    components: usize,
+    /// Of the steps of a chunk, each lane: Σ over the runs that have taken it.
+    nees: Aligned,
+    /// The same of ν²/S, by measurements, at those steps that have it.
+    nis: Vec<Aligned>,
+    /// 1 for the lanes that are runs, 0 for those beyond the last.
+    pub(super) used: Lane,
     /// Σ over the runs so far, by steps.
     nees_sum: Vec<f64>,
     nis_sum: Vec<Vec<f64>>,
-    /// 1 for the lanes that are runs, 0 for those beyond the last.
-    used: Lane,
 }
 
-/// Per step W A, then W B.
-fn whitening(axis: &AxisCourse) -> Arc<[f64]> {
+/// W A and W B by rows, step after step, with W the whitening of the claimed covariance of e = A x − B x̂.
+struct Whitening {
+    of_truth: Vec<f64>,
+    /// Empty where A = B.
+    of_estimate: Vec<f64>,
+}
+
+fn whitening(axis: &AxisCourse) -> Whitening {
     let components = axis.judge.size();
-    let (n, m) = (axis.filter.x0.len(), axis.truth.x0.len());
+    let n = axis.filter.x0.len();
     let mut covariances = Vec::with_capacity(axis.gains.steps as usize * n * n);
     let mut filter = Kalman::new(&axis.filter);
     for step in 0..axis.gains.steps {
@@ -72,21 +81,25 @@ fn whitening(axis: &AxisCourse) -> Arc<[f64]> {
         }
         covariances.extend(filter.p.iter());
     }
-    let mut whiten = vec![0.0; axis.gains.steps as usize * components * (n + m)];
-    let steps = covariances.par_chunks_exact(n * n).zip(whiten.par_chunks_exact_mut(components * (n + m)));
-    steps.with_min_len(CHUNK).for_each_init(
-        || (vec![0.0; components * n], vec![0.0; components * components]),
-        |(product, root), (covariance, whiten)| {
-            whitening_at(&axis.judge, n, covariance, product, root, whiten);
-        },
-    );
-    whiten.into()
+    let Judge { of_truth, of_estimate, .. } = &axis.judge;
+    let of: &[_] = if of_truth == of_estimate { &[of_truth] } else { &[of_truth, of_estimate] };
+    let of = of.iter().map(|of| {
+        let mut whiten = vec![0.0; axis.gains.steps as usize * of.len()];
+        let steps = covariances.par_chunks_exact(n * n).zip(whiten.par_chunks_exact_mut(of.len()));
+        steps.with_min_len(CHUNK).for_each_init(
+            || (vec![0.0; components * n], vec![0.0; components * components]),
+            |(product, root), (p, whiten)| whitening_at(&axis.judge, p, [product, root], of.as_slice(), whiten),
+        );
+        whiten
+    });
+    let mut of = of.collect::<Vec<_>>().into_iter();
+    Whitening { of_truth: of.next().unwrap_or_default(), of_estimate: of.next().unwrap_or_default() }
 }
 
-/// L⁻¹ A, then L⁻¹ B, by rows, with L Lᵀ = B P Bᵀ; NaN where that is singular. P by columns; `product` and `root` are scratch of
-/// c n and c² numbers for c components.
-fn whitening_at(judge: &Judge, n: usize, p: &[f64], product: &mut [f64], root: &mut [f64], whiten: &mut [f64]) {
-    let (c, a, b) = (judge.size(), judge.of_truth.as_slice(), judge.of_estimate.as_slice());
+/// L⁻¹ A by rows, with A = `of` by columns and L Lᵀ = B P Bᵀ; NaN where that is singular. P by columns; scratch is of c n and c² numbers for
+/// c components.
+fn whitening_at(judge: &Judge, p: &[f64], [product, root]: [&mut [f64]; 2], of: &[f64], whiten: &mut [f64]) {
+    let (c, n, b) = (judge.size(), judge.of_estimate.ncols(), judge.of_estimate.as_slice());
     // B P, then B P Bᵀ, by columns
     for (j, column) in product.chunks_exact_mut(c).enumerate() {
         for (i, value) in column.iter_mut().enumerate() {
@@ -102,73 +115,80 @@ fn whitening_at(judge: &Judge, n: usize, p: &[f64], product: &mut [f64], root: &
         whiten.fill(f64::NAN);
         return;
     }
-    let (of_truth, of_estimate) = whiten.split_at_mut(a.len());
-    for (of, whiten) in [(a, of_truth), (b, of_estimate)] {
-        let wide = of.len() / c;
-        for i in 0..c {
-            let (above, row) = whiten.split_at_mut(i * wide);
-            for (j, value) in row[..wide].iter_mut().enumerate() {
-                let rest: f64 = (0..i).map(|k| root[i + c * k] * above[k * wide + j]).sum();
-                *value = (of[i + c * j] - rest) / root[i + c * i];
-            }
+    let wide = of.len() / c;
+    for i in 0..c {
+        let (above, row) = whiten.split_at_mut(i * wide);
+        for (j, value) in row[..wide].iter_mut().enumerate() {
+            let rest: f64 = (0..i).map(|k| root[i + c * k] * above[k * wide + j]).sum();
+            *value = (of[i + c * j] - rest) / root[i + c * i];
         }
     }
 }
 
 impl Judged {
-    fn new(axis: &AxisCourse, whiten: Arc<[f64]>) -> Judged {
+    fn new(axis: &AxisCourse, whiten: Arc<Whitening>) -> Judged {
         let steps = axis.gains.steps as usize;
-        let mut nees = Aligned::new(CHUNK);
-        nees.grow(CHUNK);
         Judged {
             whiten,
             components: axis.judge.size(),
-            nees,
+            nees: Aligned::zeros(CHUNK),
+            nis: axis.channels.iter().map(|_| Aligned::zeros(CHUNK)).collect(),
+            used: [1.0; LANES],
             nees_sum: vec![0.0; steps],
             nis_sum: vec![vec![0.0; steps]; axis.channels.len()],
-            used: [1.0; LANES],
         }
     }
 
-    /// The NEES of a step.
+    /// Rows of W A and W B (none where A = B) of `count` steps from `first` on, where both have `N` states; where their NEES is added, and the
+    /// lanes that count.
+    #[inline(always)]
+    pub(super) fn of<const N: usize>(&mut self, first: usize, count: usize) -> ([&[[f64; N]]; 2], &mut [Lane], Lane) {
+        let rows = first * self.components..(first + count) * self.components;
+        let of_truth = &self.whiten.of_truth.as_chunks().0[rows.clone()];
+        let of_estimate = self.whiten.of_estimate.as_chunks().0.get(rows).unwrap_or_default();
+        ([of_truth, of_estimate], &mut self.nees.lanes_mut()[first % CHUNK..][..count], self.used)
+    }
+
+    /// Adds the NEES of a step.
     #[inline(always)]
     pub(super) fn errors(&mut self, step: usize, truth: &[Lane], estimate: &[Lane]) {
-        let (size, wide) = (self.components, truth.len() + estimate.len());
-        let rows = &self.whiten[step * size * wide..][..size * wide];
-        let (of_truth, of_estimate) = rows.split_at(size * truth.len());
+        let Whitening { of_truth, of_estimate } = &*self.whiten;
+        let of_estimate = if of_estimate.is_empty() { of_truth } else { of_estimate };
         let mut nees = [0.0; LANES];
-        for row in 0..size {
-            let mut u = [0.0; LANES];
-            for (a, x) in of_truth[row * truth.len()..].iter().zip(truth) {
-                for l in 0..LANES {
-                    u[l] += a * x[l];
-                }
-            }
-            for (b, x) in of_estimate[row * estimate.len()..].iter().zip(estimate) {
-                for l in 0..LANES {
-                    u[l] -= b * x[l];
-                }
-            }
+        for row in step * self.components..(step + 1) * self.components {
+            let of_truth = product(&of_truth[row * truth.len()..], truth);
+            let of_estimate = product(&of_estimate[row * estimate.len()..], estimate);
             for l in 0..LANES {
-                nees[l] += u[l] * u[l];
+                let u = of_truth[l] - of_estimate[l];
+                nees[l] += u * u;
             }
         }
-        self.nees.lanes_mut()[step % CHUNK] = nees;
+        let sum = &mut self.nees.lanes_mut()[step % CHUNK];
+        for l in 0..LANES {
+            sum[l] += nees[l] * self.used[l];
+        }
     }
 
-    /// Adds what the steps of a chunk left: their NEES, and the fresh normalised innovations of every measurement.
-    pub(super) fn absorb(&mut self, steps: Range<u64>, channels: &mut [ChannelSums], courses: &[Channel]) {
-        let used = self.used;
-        let chunk = steps.start as usize..steps.end as usize;
-        for (sum, nees) in self.nees_sum[chunk].iter_mut().zip(self.nees.lanes()) {
-            *sum += together(std::array::from_fn(|l| nees[l] * used[l]));
-        }
-        for ((sums, channel), course) in self.nis_sum.iter_mut().zip(channels).zip(courses) {
-            let taken = steps.clone().filter(|step| course.every <= 1 || step.is_multiple_of(course.every));
-            for (step, y) in taken.zip(&channel.y.lanes()[channel.lags..]) {
-                sums[step as usize] += together(std::array::from_fn(|l| y[l] * y[l] * used[l]));
-            }
+    /// Adds the squares of the fresh normalised innovations of every measurement.
+    fn absorb(&mut self, channels: &mut [ChannelSums]) {
+        for (sums, channel) in self.nis.iter_mut().zip(channels) {
+            let y = &channel.y.lanes()[channel.lags..];
+            Arch::new().dispatch(AddSquares { y, weight: &self.used, sums: sums.lanes_mut() });
             channel.y.keep_last(channel.lags);
+        }
+    }
+
+    /// To the sums by steps, when all runs have taken the steps of a chunk.
+    fn together(&mut self, steps: Range<u64>, courses: &[Channel]) {
+        let chunk = steps.start as usize..steps.end as usize;
+        for (sum, nees) in self.nees_sum[chunk].iter_mut().zip(self.nees.lanes_mut()) {
+            *sum += lane_sum(&std::mem::take(nees));
+        }
+        for ((sums, nis), course) in self.nis_sum.iter_mut().zip(&mut self.nis).zip(courses) {
+            let taken = steps.clone().filter(|step| course.every <= 1 || step.is_multiple_of(course.every));
+            for (step, nis) in taken.zip(nis.lanes_mut()) {
+                sums[step as usize] += lane_sum(&std::mem::take(nis));
+            }
         }
     }
 
@@ -178,9 +198,20 @@ impl Judged {
     }
 }
 
-/// The sum of a lane, by halves.
+/// Σ a x.
 #[inline(always)]
-fn together(lane: Lane) -> f64 {
+fn product(a: &[f64], x: &[Lane]) -> Lane {
+    let mut sum = [0.0; LANES];
+    for (a, x) in a.iter().zip(x) {
+        for l in 0..LANES {
+            sum[l] += a * x[l];
+        }
+    }
+    sum
+}
+
+/// By halves.
+fn lane_sum(lane: &Lane) -> f64 {
     let [a, b, c, d]: [f64; 4] = std::array::from_fn(|l| lane[l] + lane[l + 4]);
     (a + c) + (b + d)
 }
@@ -201,28 +232,21 @@ impl Course {
         let steps = axis.gains.steps as usize;
         let count = runs.end - runs.start;
         let blocks = count.div_ceil(BLOCK);
-        let whiten = whitening(axis);
+        let whiten = Arc::new(whitening(axis));
         let mut nees = vec![0.0; steps];
         let mut nis = vec![vec![0.0; steps]; axis.channels.len()];
         let mut scratches: Vec<Option<Scratch>> = (0..WAVE.min(blocks)).map(|_| None).collect();
         for wave in 0..blocks.div_ceil(WAVE) {
             let first = wave * WAVE;
             let here = (blocks - first).min(WAVE) as usize;
-            scratches[..here].par_iter_mut().enumerate().for_each(|(place, scratch)| {
-                let block = first + place as u64;
+            scratches[..here].par_iter_mut().with_max_len(1).enumerate().for_each(|(place, scratch)| {
+                let first = runs.start + (first + place as u64) * BLOCK;
                 let scratch = scratch.get_or_insert_with(|| {
                     let mut scratch = Scratch::new(axis);
                     scratch.judged = Some(Judged::new(axis, whiten.clone()));
                     scratch
                 });
-                scratch.judged.iter_mut().for_each(Judged::clear);
-                let end = runs.end.min(runs.start + (block + 1) * BLOCK);
-                for first in (runs.start + block * BLOCK..end).step_by(LANES) {
-                    if let Some(judged) = &mut scratch.judged {
-                        judged.used = std::array::from_fn(|l| f64::from(u8::from(first + (l as u64) < end)));
-                    }
-                    self.runs_of(number, first, scratch);
-                }
+                self.block(number, first..runs.end.min(first + BLOCK), scratch);
             });
             for judged in scratches[..here].iter().flatten().filter_map(|scratch| scratch.judged.as_ref()) {
                 add(&mut nees, &judged.nees_sum);
@@ -241,5 +265,34 @@ impl Course {
             }
         }
         EveryStep { nees, nis, components, runs: count }
+    }
+
+    /// Sums over the runs of a block. All of them take a chunk of steps before any takes the next: gains and whitening are read once.
+    fn block(&self, number: u32, runs: Range<u64>, scratch: &mut Scratch) {
+        let (axis, arch) = (&self.axes[number as usize], Arch::new());
+        scratch.judged.iter_mut().for_each(Judged::clear);
+        scratch.channels.iter_mut().for_each(ChannelSums::start);
+        let firsts = runs.clone().step_by(LANES);
+        let mut groups: Vec<_> = firsts.clone().map(|first| self.from(number, first, scratch)).collect();
+        for first in (0..axis.gains.steps).step_by(CHUNK) {
+            let steps = first..(first + CHUNK as u64).min(axis.gains.steps);
+            for (eight, from) in groups.iter_mut().zip(firsts.clone()) {
+                if let Some(judged) = &mut scratch.judged {
+                    judged.used = std::array::from_fn(|l| f64::from(u8::from(from + (l as u64) < runs.end)));
+                }
+                eight.draw(scratch);
+                arch.dispatch(Stretch {
+                    axis,
+                    runs: eight,
+                    scratch,
+                    observer: None,
+                    step: steps.start,
+                    stop: steps.end,
+                });
+                let Scratch { judged, channels, .. } = &mut *scratch;
+                judged.iter_mut().for_each(|judged| judged.absorb(channels));
+            }
+            scratch.judged.iter_mut().for_each(|judged| judged.together(steps.clone(), &axis.channels));
+        }
     }
 }

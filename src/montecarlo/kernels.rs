@@ -6,7 +6,7 @@
 use pulp::{NullaryFnOnce, Simd, WithSimd};
 
 use super::course::AxisCourse;
-use super::lanes::{CHUNK, ChannelSums, LANES, Lane, Observer, Scratch, Transition, Truth};
+use super::lanes::{CHUNK, ChannelSums, LANES, Lane, Observer, Runs, Scratch, Transition, Truth};
 use super::sums::{NIS_BIN, NIS_BINS};
 use crate::numerics::normals::Normals;
 
@@ -50,73 +50,99 @@ impl NullaryFnOnce for Draw<'_> {
     }
 }
 
-/// Steps `step..stop` of a chunk; hands back the number of updates so far.
-pub(super) struct Stretch<'a, 'o> {
+/// Steps `step..stop` of a chunk.
+pub(super) struct Stretch<'a, 'o, 'm> {
     pub(super) axis: &'a AxisCourse,
-    pub(super) truth: &'a Truth,
+    pub(super) runs: &'a mut Runs<'m>,
     pub(super) scratch: &'a mut Scratch,
     pub(super) observer: Option<&'a mut (dyn Observer + 'o)>,
     pub(super) step: u64,
     pub(super) stop: u64,
-    pub(super) update: usize,
 }
 
-impl WithSimd for Stretch<'_, '_> {
-    type Output = usize;
+impl WithSimd for Stretch<'_, '_, '_> {
+    type Output = ();
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> usize {
+    fn with_simd<S: Simd>(self, simd: S) {
         let one = self.observer.is_none() && self.axis.channels.len() == 1 && self.axis.channels[0].every == 1;
-        match (self.scratch.estimate.len(), self.scratch.truth.len()) {
-            (1, 1) if one => self.in_registers::<S, 1>(simd),
-            (2, 2) if one => self.in_registers::<S, 2>(simd),
-            (3, 3) if one => self.in_registers::<S, 3>(simd),
-            (4, 4) if one => self.in_registers::<S, 4>(simd),
+        let n = self.runs.estimate.len();
+        if !one || self.runs.truth.len() != n {
+            return self.in_memory(simd);
+        }
+        // every state by itself: F diagonal, and noise that drives one state alone
+        let (filter, truth) = (&self.scratch.f, &self.runs.model);
+        let diagonal = filter.diagonal.len() == n && truth.f.diagonal.len() == n;
+        let apart = diagonal && truth.process.iter().all(|column| column.len() == 1);
+        match (n, apart) {
+            (1, true) => self.in_registers::<S, 1, true>(simd),
+            (2, true) => self.in_registers::<S, 2, true>(simd),
+            (3, true) => self.in_registers::<S, 3, true>(simd),
+            (4, true) => self.in_registers::<S, 4, true>(simd),
+            (1, false) => self.in_registers::<S, 1, false>(simd),
+            (2, false) => self.in_registers::<S, 2, false>(simd),
+            (3, false) => self.in_registers::<S, 3, false>(simd),
+            (4, false) => self.in_registers::<S, 4, false>(simd),
             _ => self.in_memory(simd),
         }
     }
 }
 
-impl Stretch<'_, '_> {
-    /// The same as [`in_memory`](Stretch::in_memory) for a filter and a truth of `N` states with one measurement at every step.
+impl Stretch<'_, '_, '_> {
+    /// The same as [`in_memory`](Stretch::in_memory) for a filter and a truth of `N` states with one measurement at every step. `APART`: no
+    /// state drives another.
     #[inline(always)]
-    fn in_registers<S: Simd, const N: usize>(self, simd: S) -> usize {
-        let Stretch { axis, truth, scratch, observer: _, step: first, stop, update } = self;
-        let Scratch { truth: x, estimate, f, h, process, noise, channels, judged, .. } = scratch;
+    fn in_registers<S: Simd, const N: usize, const APART: bool>(self, simd: S) {
+        let Stretch { axis, runs, scratch, observer: _, step: first, stop } = self;
+        let Runs { model, truth: x, estimate, update, .. } = runs;
+        let Scratch { f, h, process, noise, channels, judged, .. } = scratch;
+        let (at, count) = ((first % CHUNK as u64) as usize, (stop - first) as usize);
         let y = &mut channels[0].y;
         let from = y.len();
-        let at = (first % CHUNK as u64) as usize;
-        let count = (stop - first) as usize;
         y.grow(count);
-        let y = wide_mut::<S>(&mut y.lanes_mut()[from..]);
-        let noise = wide::<S>(&noise[0].numbers.lanes()[at..at + count]);
-        let gains = axis.gains.gains[update * N..].as_chunks::<N>().0;
-        let weights = &axis.gains.weights[update..update + count];
-        let diagonal = f.diagonal.len() == N && truth.f.diagonal.len() == N;
-        let h: [S::f64s; N] = std::array::from_fn(|i| simd.splat_f64s(h[0][i]));
+        let y = wide_mut::<S>(&mut y.lanes_mut()[from..][..count]);
+        let noise = wide::<S>(&noise[0].lanes()[at..][..count]);
+        let gains = &axis.gains.gains[*update * N..].as_chunks::<N>().0[..count];
+        let weights = &axis.gains.weights[*update..][..count];
+        *update += count;
+        // the noise of each state; of those without, zero
+        let mut roots = [[0.0; LANES]; N];
+        let mut draws = [noise; N];
+        for (column, numbers) in model.process.iter().zip(process.iter()).filter(|_| APART) {
+            let (row, root) = column[0];
+            (roots[row], draws[row]) = (root, wide::<S>(&numbers.lanes()[at..][..count]));
+        }
+        let mut judge = judged.as_mut().map(|judged| judged.of::<N>(first as usize, count));
+        let size = judge.as_ref().map_or(0, |([of_truth, _], ..)| of_truth.len() / count.max(1));
         for p in 0..pieces::<S>() {
             let of = |lanes: &[Lane], i: usize| wide::<S>(lanes)[i * pieces::<S>() + p];
             let mut state: [S::f64s; N] = std::array::from_fn(|i| of(x, i));
             let mut found: [S::f64s; N] = std::array::from_fn(|i| of(estimate, i));
-            let seen: [S::f64s; N] = std::array::from_fn(|i| of(&truth.h[0], i));
-            let root = of(&truth.root_r, 0);
-            for k in 0..count {
+            let seen: [S::f64s; N] = std::array::from_fn(|i| of(&model.h[0], i));
+            let looked: [S::f64s; N] = std::array::from_fn(|i| simd.splat_f64s(h[0][i]));
+            let kept = |f: &Transition<Lane>, i: usize| if APART { of(&f.diagonal, i) } else { simd.splat_f64s(0.0) };
+            let state_kept: [S::f64s; N] = std::array::from_fn(|i| kept(&model.f, i));
+            let found_kept: [S::f64s; N] = std::array::from_fn(|i| kept(f, i));
+            let roots: [S::f64s; N] = std::array::from_fn(|i| of(&roots, i));
+            let root = of(&model.root_r, 0);
+            for (k, (gain, weight)) in gains.iter().zip(weights).enumerate() {
+                let place = k * pieces::<S>() + p;
                 if first > 0 || k > 0 {
-                    if diagonal {
+                    if APART {
                         for i in 0..N {
-                            state[i] = simd.mul_f64s(state[i], of(&truth.f.diagonal, i));
-                            found[i] = simd.mul_f64s(found[i], of(&f.diagonal, i));
+                            let kick = simd.mul_f64s(roots[i], draws[i][place]);
+                            state[i] = simd.add_f64s(simd.mul_f64s(state[i], state_kept[i]), kick);
+                            found[i] = simd.mul_f64s(found[i], found_kept[i]);
                         }
                     } else {
-                        state = moved(simd, &truth.f, &state, p);
+                        state = moved(simd, &model.f, &state, p);
                         found = moved(simd, f, &found, p);
-                    }
-                    for (column, source) in truth.process.iter().zip(process.iter()) {
-                        let draw = of(&source.numbers.lanes()[at + k..at + k + 1], 0);
-                        for (row, root) in column {
-                            let root = of(std::slice::from_ref(root), 0);
-                            for (i, state) in state.iter_mut().enumerate() {
-                                if i == *row {
-                                    *state = simd.add_f64s(*state, simd.mul_f64s(root, draw));
+                        for (column, numbers) in model.process.iter().zip(process.iter()) {
+                            let draw = of(&numbers.lanes()[at + k..at + k + 1], 0);
+                            for (row, root) in column {
+                                let kick = simd.mul_f64s(of(std::slice::from_ref(root), 0), draw);
+                                // a place that is not known to the compiler would keep all states in memory
+                                for (i, state) in state.iter_mut().enumerate() {
+                                    *state = if i == *row { simd.add_f64s(*state, kick) } else { *state };
                                 }
                             }
                         }
@@ -126,30 +152,24 @@ impl Stretch<'_, '_> {
                 for (h, x) in seen.iter().zip(&state) {
                     z = simd.add_f64s(z, simd.mul_f64s(*h, *x));
                 }
-                let mut rest = simd.add_f64s(z, simd.mul_f64s(root, noise[k * pieces::<S>() + p]));
-                for (h, x) in h.iter().zip(&found) {
+                let mut rest = simd.add_f64s(z, simd.mul_f64s(root, noise[place]));
+                for (h, x) in looked.iter().zip(&found) {
                     rest = simd.sub_f64s(rest, simd.mul_f64s(*h, *x));
                 }
-                for (k, x) in gains[k].iter().zip(&mut found) {
+                for (k, x) in gain.iter().zip(&mut found) {
                     *x = simd.add_f64s(*x, simd.mul_f64s(simd.splat_f64s(*k), rest));
                 }
-                let normalised = simd.mul_f64s(rest, simd.splat_f64s(weights[k]));
-                y[k * pieces::<S>() + p] = normalised;
-                if let Some(judged) = &mut *judged {
-                    let step = first as usize + k;
-                    let size = judged.components;
-                    let rows = judged.whiten[step * size * 2 * N..][..size * 2 * N].as_chunks::<N>().0;
-                    let (of_truth, of_estimate) = rows.split_at(size);
-                    let mut nees = simd.splat_f64s(0.0);
-                    for (a, b) in of_truth.iter().zip(of_estimate) {
-                        let mut u = simd.splat_f64s(0.0);
-                        for i in 0..N {
-                            u = simd.add_f64s(u, simd.mul_f64s(simd.splat_f64s(a[i]), state[i]));
-                            u = simd.sub_f64s(u, simd.mul_f64s(simd.splat_f64s(b[i]), found[i]));
-                        }
-                        nees = simd.add_f64s(nees, simd.mul_f64s(u, u));
-                    }
-                    wide_mut::<S>(&mut judged.nees.lanes_mut()[step % CHUNK..][..1])[p] = nees;
+                y[place] = simd.mul_f64s(rest, simd.splat_f64s(*weight));
+                if let Some(([of_truth, of_estimate], nees, used)) = &mut judge {
+                    let a = &of_truth[k * size..][..size];
+                    let found = if of_estimate.is_empty() {
+                        let error = std::array::from_fn(|i| simd.sub_f64s(state[i], found[i]));
+                        if size == N { squares(simd, &a[..N], &error) } else { squares(simd, a, &error) }
+                    } else {
+                        squares_apart(simd, a, &of_estimate[k * size..][..size], &state, &found)
+                    };
+                    let nees = &mut wide_mut::<S>(std::slice::from_mut(&mut nees[k]))[p];
+                    *nees = simd.add_f64s(*nees, simd.mul_f64s(found, of(std::slice::from_ref(used), 0)));
                 }
             }
             for i in 0..N {
@@ -157,13 +177,13 @@ impl Stretch<'_, '_> {
                 wide_mut::<S>(estimate)[i * pieces::<S>() + p] = found[i];
             }
         }
-        update + count
     }
 
     #[inline(always)]
-    fn in_memory<S: Simd>(self, simd: S) -> usize {
-        let Stretch { axis, truth, scratch, mut observer, step: first, stop, mut update } = self;
-        let Scratch { truth: x, estimate, spare, f, h, process, noise, channels, judged, .. } = scratch;
+    fn in_memory<S: Simd>(self, simd: S) {
+        let Stretch { axis, runs, scratch, mut observer, step: first, stop } = self;
+        let Runs { model: truth, truth: x, estimate, update, .. } = runs;
+        let Scratch { spare, f, h, process, noise, channels, judged, .. } = scratch;
         let n = axis.gains.states;
         for step in first..stop {
             let k = (step % CHUNK as u64) as usize;
@@ -171,7 +191,7 @@ impl Stretch<'_, '_> {
                 apply(simd, &truth.f, x, spare);
                 for (column, source) in truth.process.iter().zip(process.iter()) {
                     for (i, root) in column {
-                        let (root, draw) = (std::slice::from_ref(root), &source.numbers.lanes()[k..k + 1]);
+                        let (root, draw) = (std::slice::from_ref(root), &source.lanes()[k..k + 1]);
                         add_product(simd, wide_mut::<S>(&mut x[*i..i + 1]), wide::<S>(root), wide::<S>(draw));
                     }
                 }
@@ -181,11 +201,11 @@ impl Stretch<'_, '_> {
                 if channel.every != 1 && !step.is_multiple_of(channel.every) {
                     continue;
                 }
-                let gain = &axis.gains.gains[update * n..][..n];
-                let weight = axis.gains.weights[update];
-                update += 1;
+                let gain = &axis.gains.gains[*update * n..][..n];
+                let weight = axis.gains.weights[*update];
+                *update += 1;
                 let [mut z, mut innovation, mut y] = [[0.0; LANES]; 3];
-                measure(simd, truth, c, x, &noise[c].numbers.lanes()[k], &mut z);
+                measure(simd, truth, c, x, &noise[c].lanes()[k], &mut z);
                 innovate(simd, &h[c], gain, &z, estimate, &mut innovation);
                 let weight = simd.splat_f64s(weight);
                 let registers = wide_mut::<S>(std::slice::from_mut(&mut y)).iter_mut();
@@ -204,8 +224,42 @@ impl Stretch<'_, '_> {
                 observer.step(step, x, estimate);
             }
         }
-        update
     }
+}
+
+/// |A e|² of the rows of A.
+#[inline(always)]
+fn squares<S: Simd, const N: usize>(simd: S, rows: &[[f64; N]], error: &[S::f64s; N]) -> S::f64s {
+    let mut sum = simd.splat_f64s(0.0);
+    for row in rows {
+        let mut u = simd.mul_f64s(simd.splat_f64s(row[0]), error[0]);
+        for i in 1..N {
+            u = simd.add_f64s(u, simd.mul_f64s(simd.splat_f64s(row[i]), error[i]));
+        }
+        sum = simd.add_f64s(sum, simd.mul_f64s(u, u));
+    }
+    sum
+}
+
+/// |A x − B x̂|² of the rows of A and B.
+#[inline(always)]
+fn squares_apart<S: Simd, const N: usize>(
+    simd: S,
+    of_truth: &[[f64; N]],
+    of_estimate: &[[f64; N]],
+    truth: &[S::f64s; N],
+    estimate: &[S::f64s; N],
+) -> S::f64s {
+    let mut sum = simd.splat_f64s(0.0);
+    for (a, b) in of_truth.iter().zip(of_estimate) {
+        let mut u = simd.splat_f64s(0.0);
+        for i in 0..N {
+            u = simd.add_f64s(u, simd.mul_f64s(simd.splat_f64s(a[i]), truth[i]));
+            u = simd.sub_f64s(u, simd.mul_f64s(simd.splat_f64s(b[i]), estimate[i]));
+        }
+        sum = simd.add_f64s(sum, simd.mul_f64s(u, u));
+    }
+    sum
 }
 
 /// F x, one register of every lane.
@@ -263,6 +317,25 @@ fn innovate<S: Simd>(simd: S, h: &[f64], gain: &[f64], z: &Lane, x: &mut [Lane],
             x[p] = simd.add_f64s(x[p], simd.mul_f64s(simd.splat_f64s(*k), rest));
         }
         *innovation = rest;
+    }
+}
+
+/// sums ← sums + y² · weight.
+pub(super) struct AddSquares<'a> {
+    pub(super) y: &'a [Lane],
+    pub(super) weight: &'a Lane,
+    pub(super) sums: &'a mut [Lane],
+}
+
+impl WithSimd for AddSquares<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let weight = wide::<S>(std::slice::from_ref(self.weight));
+        for (i, (sum, y)) in wide_mut::<S>(self.sums).iter_mut().zip(wide::<S>(self.y)).enumerate() {
+            let square = simd.mul_f64s(*y, *y);
+            *sum = simd.add_f64s(*sum, simd.mul_f64s(square, weight[i % pieces::<S>()]));
+        }
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! Lanes never mix: the numbers of a run do not depend on which runs are beside it.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
@@ -39,6 +40,12 @@ impl Aligned {
         // where a platform cannot say, lanes are right but slower
         let offset = numbers.as_ptr().align_offset(size_of::<Lane>());
         Aligned { numbers, offset: if offset < LANES { offset } else { 0 }, length: 0 }
+    }
+    /// As many lanes, zero.
+    pub(super) fn zeros(count: usize) -> Aligned {
+        let mut lanes = Aligned::new(count);
+        lanes.grow(count);
+        lanes
     }
     pub(super) fn len(&self) -> usize {
         self.length
@@ -160,13 +167,13 @@ pub(super) trait Observer {
 
 /// Memory of a worker: taken once for an axis.
 pub(super) struct Scratch {
-    pub(super) truth: Vec<Lane>,
-    pub(super) estimate: Vec<Lane>,
     pub(super) spare: Vec<Lane>,
     pub(super) f: Transition<Lane>,
     pub(super) h: Vec<Vec<f64>>,
-    pub(super) process: Vec<Source>,
-    pub(super) noise: Vec<Source>,
+    words: Vec<[u64; LANES]>,
+    /// Numbers of a chunk, one per step (of which a measurement that is not taken at every step uses some).
+    pub(super) process: Vec<Aligned>,
+    pub(super) noise: Vec<Aligned>,
     pub(super) channels: Vec<ChannelSums>,
     /// What every step is judged by, when it is wanted.
     pub(super) judged: Option<Judged>,
@@ -211,7 +218,7 @@ impl ChannelSums {
         }
     }
 
-    fn start(&mut self) {
+    pub(super) fn start(&mut self) {
         self.y.clear();
         self.y.grow(self.lags);
         (self.sum, self.squares, self.block, self.filled) = ([0.0; LANES], [0.0; LANES], [0.0; LANES], 0);
@@ -256,13 +263,12 @@ impl Scratch {
         let m = axis.truth.x0.len();
         let layout = &axis.layout;
         Scratch {
-            truth: vec![[0.0; LANES]; m],
-            estimate: vec![[0.0; LANES]; n],
             spare: vec![[0.0; LANES]; n.max(m)],
             f: Transition::new(n, entries([&axis.filter.f; LANES])),
             h: axis.filter.h.row_iter().map(|row| row.iter().copied().collect()).collect(),
-            process: Vec::new(),
-            noise: Vec::new(),
+            words: vec![[0; LANES]; CHUNK],
+            process: (0..m).map(|_| Aligned::zeros(CHUNK)).collect(),
+            noise: axis.channels.iter().map(|_| Aligned::zeros(CHUNK)).collect(),
             judged: None,
             channels: axis.channels.iter().map(ChannelSums::new).collect(),
             values: std::array::from_fn(|_| vec![0.0; layout.values]),
@@ -271,80 +277,87 @@ impl Scratch {
     }
 }
 
-/// One source of noise: the streams of the runs and the numbers of a chunk, one per step (of which a measurement that is not taken at
-/// every step uses some).
-pub(super) struct Source {
-    normals: Normals<LANES>,
-    words: Vec<[u64; LANES]>,
-    pub(super) numbers: Aligned,
+/// Eight runs under way: where their truths and estimates stand, and their generators.
+pub(super) struct Runs<'a> {
+    pub(super) model: Cow<'a, Truth>,
+    pub(super) truth: Vec<Lane>,
+    pub(super) estimate: Vec<Lane>,
+    /// Updates so far.
+    pub(super) update: usize,
+    process: Vec<Normals<LANES>>,
+    noise: Vec<Normals<LANES>>,
 }
 
-impl Source {
-    fn new(normals: Normals<LANES>) -> Source {
-        let mut numbers = Aligned::new(CHUNK);
-        numbers.grow(CHUNK);
-        Source { normals, words: vec![[0; LANES]; CHUNK], numbers }
+impl<'a> Runs<'a> {
+    /// At step 0: x(0) ~ N(x0, P0).
+    pub(super) fn new(
+        axis: &AxisCourse,
+        number: u32,
+        model: Cow<'a, Truth>,
+        seed: u64,
+        runs: [u64; LANES],
+        scratch: &mut Scratch,
+    ) -> Runs<'a> {
+        let address = |term| Normals::new(seed, runs.map(|run| StreamId { run, axis: number, term }));
+        let mut truth = model.x0.clone();
+        let mut draws = Aligned::zeros(CHUNK);
+        draw(&mut address(START), &mut scratch.words, &mut draws);
+        for (column, draw) in model.start.iter().zip(draws.lanes()) {
+            for (i, root) in column {
+                for l in 0..LANES {
+                    truth[*i][l] += root[l] * draw[l];
+                }
+            }
+        }
+        Runs {
+            truth,
+            estimate: axis.filter.x0.iter().map(|x0| [*x0; LANES]).collect(),
+            update: 0,
+            process: (0..).zip(&model.process).map(|(i, _)| address(PROCESS + i)).collect(),
+            noise: (0..).zip(&axis.channels).map(|(i, _)| address(MEASUREMENT + i)).collect(),
+            model,
+        }
     }
-    fn draw(&mut self, arch: Arch) {
-        arch.dispatch(Draw { normals: &mut self.normals, words: &mut self.words, numbers: self.numbers.lanes_mut() });
+
+    /// Fresh numbers of all sources for the next chunk.
+    pub(super) fn draw(&mut self, scratch: &mut Scratch) {
+        let Scratch { words, process, noise, .. } = scratch;
+        let sources = self.process.iter_mut().zip(process).chain(self.noise.iter_mut().zip(noise));
+        sources.for_each(|(normals, numbers)| draw(normals, words, numbers));
     }
 }
 
-/// Runs `runs` through the axis; results are in `scratch.values` and `scratch.counts`, one lane per run, or, where every step is judged,
-/// added up in `scratch.judged` and nowhere else.
+fn draw(normals: &mut Normals<LANES>, words: &mut [[u64; LANES]], numbers: &mut Aligned) {
+    Arch::new().dispatch(Draw { normals, words, numbers: numbers.lanes_mut() });
+}
+
+/// Runs `runs` through the axis; results are in `scratch.values` and `scratch.counts`, one lane per run.
 ///
 /// A run: x(0) ~ N(x0, P0), then z = H x + v, update with the gain of that step, x ← F x + w, and so on. The inner loops are compiled for
 /// each instruction set; operations and their order are the same in all, and so are the bits.
 pub(super) fn simulate(
     axis: &AxisCourse,
-    number: u32,
-    truth: &Truth,
-    seed: u64,
-    runs: [u64; LANES],
+    mut runs: Runs,
     scratch: &mut Scratch,
     mut observer: Option<&mut dyn Observer>,
 ) {
     let arch = Arch::new();
-    let address = |term| Source::new(Normals::new(seed, runs.map(|run| StreamId { run, axis: number, term })));
-    scratch.process = (0..).zip(&truth.process).map(|(i, _)| address(PROCESS + i)).collect();
-    scratch.noise = (0..).zip(&axis.channels).map(|(i, _)| address(MEASUREMENT + i)).collect();
     scratch.channels.iter_mut().for_each(ChannelSums::start);
     scratch.counts.iter_mut().for_each(|counts| counts.fill(0));
-    scratch.truth.copy_from_slice(&truth.x0);
-    let mut start = address(START);
-    start.draw(arch);
-    for (column, draw) in truth.start.iter().zip(start.numbers.lanes()) {
-        for (i, root) in column {
-            for l in 0..LANES {
-                scratch.truth[*i][l] += root[l] * draw[l];
-            }
-        }
-    }
-    for (state, x0) in scratch.estimate.iter_mut().zip(axis.filter.x0.iter()) {
-        *state = [*x0; LANES];
-    }
-    let (mut step, mut update) = (0, 0);
-    // who asks for every step does not ask for epochs and sums
-    let epochs = if scratch.judged.is_some() { &[] } else { &*axis.epochs };
-    let mut epochs = epochs.iter().enumerate().peekable();
+    let mut step = 0;
+    let mut epochs = axis.epochs.iter().enumerate().peekable();
     while step < axis.gains.steps {
-        for source in scratch.process.iter_mut().chain(&mut scratch.noise) {
-            source.draw(arch);
-        }
-        let (first, end) = (step, (step + CHUNK as u64).min(axis.gains.steps));
+        runs.draw(scratch);
+        let end = (step + CHUNK as u64).min(axis.gains.steps);
         while step < end {
             // up to the next epoch, whose errors are judged
             let stop = epochs.peek().map_or(end, |(_, epoch)| (epoch.step + 1).min(end));
             let observer = observer.as_mut().map(|observer| &mut **observer as &mut dyn Observer);
-            update = arch.dispatch(Stretch { axis, truth, scratch, observer, step, stop, update });
+            arch.dispatch(Stretch { axis, runs: &mut runs, scratch, observer, step, stop });
             step = stop;
             if let Some((i, epoch)) = epochs.next_if(|(_, epoch)| epoch.step + 1 == stop) {
-                judge(epoch, i, &axis.layout, scratch);
+                judge(epoch, i, &axis.layout, &runs, scratch);
             }
-        }
-        if let Some(judged) = &mut scratch.judged {
-            judged.absorb(first..end, &mut scratch.channels, &axis.channels);
-            continue;
         }
         for (c, (sums, channel)) in scratch.channels.iter_mut().zip(&axis.channels).enumerate() {
             let place = axis.layout.histogram(c);
@@ -352,17 +365,14 @@ pub(super) fn simulate(
             arch.dispatch(Absorb { sums, base: channel.base, histogram });
         }
     }
-    if scratch.judged.is_some() {
-        return;
-    }
     for (c, (sums, channel)) in scratch.channels.iter_mut().zip(&axis.channels).enumerate() {
         sums.finish(channel, c, &axis.layout, &mut scratch.values);
     }
 }
 
 /// The errors at an epoch.
-fn judge(epoch: &EpochCourse, number: usize, layout: &Layout, scratch: &mut Scratch) {
-    let Scratch { truth, estimate, values, counts, .. } = scratch;
+fn judge(epoch: &EpochCourse, number: usize, layout: &Layout, runs: &Runs, scratch: &mut Scratch) {
+    let (Runs { truth, estimate, .. }, Scratch { values, counts, .. }) = (runs, scratch);
     let size = epoch.sigma.len();
     for l in 0..LANES {
         let (place, mean, moments) = (layout.epoch(number), layout.mean(number), layout.moments(number));

@@ -8,7 +8,7 @@ use crate::cli::stretch;
 use crate::cli::windows::{Windows, note};
 use crate::identify::ModelChoice;
 use crate::identify::windows::Windows as Likelihoods;
-use crate::input::LogOptions;
+use crate::input::{LogOptions, TemperatureColumn};
 
 /// The axes in windows, if `--window` or the size of the file asks for it.
 pub(super) fn axes(
@@ -31,6 +31,7 @@ pub(super) fn axes(
         }
         return Ok(None);
     }
+    let options = &LogOptions { temperature: TemperatureColumn::Ignored, ..options.clone() };
     let Some(windows) = Windows::open(&args.logs[0], args.window.as_deref(), options)? else { return Ok(None) };
     let (samples, dt, axes, length) = (windows.samples, windows.dt, windows.axes(), windows.length());
     let log = Log {
@@ -49,7 +50,7 @@ pub(super) fn axes(
         let count = likelihood.len();
         let said = note(&name, count as u64, &length, left_out, "whose likelihoods are multiplied")?;
         let mut identified = likelihood.identify(choice)?;
-        identified.warnings.push(format!("{said}; outliers and steps were not looked for"));
+        identified.warnings.push(format!("{said}; outliers, steps and a temperature were not looked for"));
         log.warn_of_motion(&name, &mut identified);
         let (curve, fit) = (identified.curve.clone(), Ok(identified.model.clone()));
         found.push(Axis {

@@ -2,10 +2,11 @@
 
 use pulp::NullaryFnOnce;
 
+use super::usable;
 use crate::filter::kalman::{predict_fixed, update_fixed};
 
-/// Steps between looks at whether the gains stand still, and variances whose product is taken before its logarithm: a variance between
-/// 1e-18 and 1e18 cannot make it over- or underflow.
+/// Steps between looks at whether the gains stand still, and variances whose product, each over R, is taken before its logarithm: up to
+/// 1e19 times R cannot make it overflow.
 pub(super) const LOOK: usize = 16;
 
 /// `N` states beside the bias, started: the state is that after an update.
@@ -39,15 +40,16 @@ pub(super) struct Came {
 
 impl<const N: usize> NullaryFnOnce for Approach<'_, N> {
     type Output = Came;
-    /// Whole looks only, up to one with a sample that is not a finite number.
+    /// Whole looks only, up to one with a sample that cannot be used.
     #[inline(always)]
     fn call(self) -> Came {
         let mut came = Came { samples: 0, log_variance: 0.0, nis: 0.0, settled: false };
         let (mut x, mut p, mut answer) = (*self.x, *self.p, *self.answer);
         let (mut bias, mut information) = (*self.bias, *self.information);
+        let inverse_r = 1.0 / self.r;
         let looks = self.z.as_chunks::<LOOK>().0.iter().zip(self.innovation.as_chunks_mut::<LOOK>().0);
         for ((z, innovation), weight) in looks.zip(self.weight.as_chunks_mut::<LOOK>().0) {
-            if !z.iter().all(|z| z.is_finite()) || came.settled {
+            if !z.iter().all(|z| usable(*z)) || came.settled {
                 break;
             }
             let (mut product, mut before) = (1.0, (p, answer));
@@ -74,10 +76,10 @@ impl<const N: usize> NullaryFnOnce for Approach<'_, N> {
                 *weight = 1.0 / variance;
                 information += s * s * inverse;
                 bias += s * inverse / information * *innovation;
-                product *= variance;
+                product *= variance * inverse_r;
                 came.nis += *innovation * *innovation * *weight;
             }
-            came.log_variance += product.ln();
+            came.log_variance += product.ln() - LOOK as f64 * inverse_r.ln();
             came.samples += LOOK;
             came.settled = still(&before.0, &p, &before.1, &answer);
         }

@@ -85,15 +85,20 @@ impl Ordinates {
     /// Windows of the same length and lines taken together; `None` of none.
     pub(super) fn pooled(windows: &[Ordinates]) -> Option<Ordinates> {
         let (first, others) = windows.split_first()?;
-        let mut all = Ordinates { windows: windows.len(), ..first.clone() };
-        for (bin, own) in others.iter().flat_map(|window| (0..).zip(&window.bins)) {
-            let bin: &mut Bin = &mut all.bins[bin];
+        let mut all = first.clone();
+        others.iter().for_each(|other| all.add(other));
+        Some(all)
+    }
+
+    /// Takes in windows of the same length and lines.
+    pub(super) fn add(&mut self, other: &Ordinates) {
+        self.windows += other.windows;
+        for (bin, own) in self.bins.iter_mut().zip(&other.bins) {
             bin.count += own.count;
             bin.power += own.power;
             bin.with_ramp += own.with_ramp;
             bin.ramp += own.ramp;
         }
-        Some(all)
     }
 
     /// What a log of so many samples would have before it is recorded: bins without power. `grid` is made of their frequencies.

@@ -9,13 +9,20 @@ use super::{Candidates, FITTED_SHARE, Identified, IdentifyError, ModelChoice, Wh
 use crate::allan::{Deviation, Pooled, TauGrid, deviation};
 use crate::units::Unit;
 
-/// What is kept of the windows of one axis: a few hundred bins each.
+/// Groups of windows that are held apart at most, at least half of it once there are as many.
+const GROUPS: usize = 96;
+
+/// What is kept of the windows of one axis: groups of as many neighbours each, a few hundred bins a group, however many windows there are.
 #[derive(Clone, Debug)]
 pub struct Windows {
     name: String,
     display: Unit,
     dt: f64,
-    windows: Vec<Ordinates>,
+    groups: Vec<Ordinates>,
+    /// Windows of the last group, of a full group, and of all.
+    begun: usize,
+    size: usize,
+    count: usize,
     /// Σ of the means of the windows.
     level: f64,
     curve: Pooled,
@@ -25,7 +32,17 @@ impl Windows {
     /// For windows of so many samples of period `dt` (s); `display` is the unit of the log, in whose family results are written.
     pub fn new(name: &str, samples: usize, dt: f64, display: &Unit) -> Windows {
         let curve = Pooled::new(Deviation::Oadev, samples, dt, TauGrid::Log(super::POINTS_PER_DECADE));
-        Windows { name: name.into(), display: display.clone(), dt, windows: Vec::new(), level: 0.0, curve }
+        Windows {
+            name: name.into(),
+            display: display.clone(),
+            dt,
+            groups: Vec::new(),
+            begun: 0,
+            size: 1,
+            count: 0,
+            level: 0.0,
+            curve,
+        }
     }
 
     /// Another window: rate samples, SI. Lines are looked for in the first. Fails on a window of another length, and as
@@ -35,34 +52,47 @@ impl Windows {
         self.curve
             .add(&deviation::phase(rate, self.dt))
             .map_err(|error| IdentifyError { message: format!("{}: {error}", self.name) })?;
-        let lines = self.windows.first().map(|first| first.lines.clone());
-        self.windows.push(Ordinates::new(rate, self.dt, lines.as_deref()));
+        let lines = self.groups.first().map(|first| first.lines.clone());
+        let window = Ordinates::new(rate, self.dt, lines.as_deref());
+        match self.groups.last_mut() {
+            Some(last) if self.begun < self.size => last.add(&window),
+            _ => {
+                if self.groups.len() == GROUPS {
+                    self.groups = self.groups.chunks(2).filter_map(Ordinates::pooled).collect();
+                    self.size *= 2;
+                }
+                self.groups.push(window);
+                self.begun = 0;
+            }
+        }
+        self.begun += 1;
+        self.count += 1;
         self.level += crate::numerics::reduce::mean(rate);
         Ok(())
     }
 
     /// Windows so far.
     pub fn len(&self) -> usize {
-        self.windows.len()
+        self.count
     }
 
     pub fn is_empty(&self) -> bool {
-        self.windows.is_empty()
+        self.count == 0
     }
 
     /// Terms chosen, parameters and intervals as from a log held at once, but for the last step on the exact likelihood. What is held out is the
-    /// last third of the windows. Fails without a window.
+    /// last third of the groups. Fails without a window.
     pub fn identify(self, choice: &ModelChoice) -> Result<Identified, IdentifyError> {
-        let Windows { name, display, dt, windows, level, curve } = self;
-        let Some(data) = Ordinates::pooled(&windows) else {
+        let Windows { name, display, dt, groups, count, level, curve, .. } = self;
+        let Some(data) = Ordinates::pooled(&groups) else {
             return Err(IdentifyError { message: format!("{name}: no window of the log is whole") });
         };
-        let early = (windows.len() as f64 * FITTED_SHARE) as usize;
-        let parts = || Some([Ordinates::pooled(&windows[..early])?, Ordinates::pooled(&windows[early..])?]);
+        let early = (groups.len() as f64 * FITTED_SHARE) as usize;
+        let parts = || Some([Ordinates::pooled(&groups[..early])?, Ordinates::pooled(&groups[early..])?]);
         let whole = Whole {
             name: &name,
-            samples: data.samples * windows.len(),
-            level: level / windows.len() as f64,
+            samples: data.samples * count,
+            level: level / count as f64,
             dt,
             display: &display,
             choice,

@@ -297,6 +297,38 @@ fn the_consumers_own_formulas_give_the_parameters_back() {
     }
 }
 
+/// Noise behind a low-pass: white noise of 0.01 and an oscillation of 3 Hz that dies away in 0.05 s. N is what the mean over a long time shows:
+/// σ²(mean over T)·T by the autocovariance, here in closed form as the sum over all lags, 1e-9 of it beyond the last that is taken.
+#[test]
+fn density_at_low_frequencies() {
+    let (sigma, f0, time, dt) = (0.2_f64, 3.0_f64, 0.05_f64, 0.01_f64);
+    let bench = bench();
+    let white = r#""white": {"density": {"value": 0.0562, "unit": "deg/s/sqrt(Hz)", "interval": [0.0555, 0.0569]}}"#;
+    let with = |extra: &str| GYRO.replace(white, &format!(r#""white": {{"density": "0.01 deg/s/sqrt(Hz)"}}{extra}"#));
+    bench.file(
+        "slow.json",
+        with(r#", "oscillation": {"std_dev": "0.2 deg/s", "frequency": "3 Hz", "correlation_time": "0.05 s"}"#),
+    );
+    let found = bench.run("export slow.json --to kalibr");
+    let lag = |h: i32| {
+        let tau = f64::from(h) * dt;
+        sigma.powi(2) * (-tau / time).exp() * (std::f64::consts::TAU * f0 * tau).cos()
+    };
+    let density = dt * (lag(0) + 2.0 * (1..200).map(lag).sum::<f64>());
+    let expected = (0.01_f64.powi(2) + density).sqrt();
+    assert!(expected > 3.0 * 0.01, "{expected}");
+    close(field(&found.stdout, "gyroscope_noise_density:").to_degrees(), expected);
+    let said = format!("N is {:.2} times that of the white noise alone", expected / 0.01);
+    assert!(found.stderr.contains(&said) && found.stdout.contains(&said), "{said}: {}", found.stderr);
+    // a drift that dies away within a second is no walk
+    let fast = with(r#", "rate_random_walk": {"density": "1e-6 deg/s/sqrt(s)"}"#).replace("193.9312 s", "1 s");
+    bench.file("fast.json", fast);
+    let words = "K is that of the fastest drift and 8 times that of --walk horizon=60s";
+    assert!(bench.ok("export fast.json --to kalibr").contains(words));
+    assert!(!bench.ok("export fast.json --to kalibr --walk horizon=60s").contains(words));
+    assert!(!bench.ok("export gyro.json --to kalibr").contains(words));
+}
+
 /// One number for three axes, walks and their price, what is left out, and ranges.
 #[test]
 fn choices_are_said_in_the_file() {
@@ -314,7 +346,10 @@ fn choices_are_said_in_the_file() {
     let (worst, text) = of("worst");
     close(worst, 0.0562);
     assert!(text.contains("left out, no field for it: oscillation") && text.contains("the largest"), "{text}");
-    close(of("mean").0, ((0.03_f64.powi(2) + 0.04_f64.powi(2) + 0.0562_f64.powi(2)) / 3.0).sqrt());
+    // what the line of x has at low frequencies
+    let line = 2.0 * 0.1_f64.powi(2) / (1.0 + (std::f64::consts::TAU * 20.0).powi(2));
+    let mean = ((0.03_f64.powi(2) + line + 0.04_f64.powi(2) + 0.0562_f64.powi(2)) / 3.0).sqrt();
+    assert!((of("mean").0 / mean - 1.0).abs() < 1e-4, "{} and {mean}", of("mean").0);
     close(of("y").0, 0.04);
     // a walk in place of the drift, at rest: its price, by the steady states of both filters
     let price = text.lines().find(|l| l.contains("times the error")).unwrap();

@@ -64,7 +64,7 @@ pub struct Written {
 
 /// The file for `target`. Errors: a sensor that the consumer needs is not there, or does not fit its form.
 pub fn write(target: Target, export: &Export) -> Result<Written, String> {
-    match target {
+    let mut written = match target {
         Target::Kalibr => kalibr::write(export),
         Target::OpenVins => openvins::write(export),
         Target::Vins => vins::write(export),
@@ -76,7 +76,9 @@ pub fn write(target: Target, export: &Export) -> Result<Written, String> {
         Target::GnssInsSim => gnss_ins_sim::write(export),
         Target::NaveGo => navego::write(export),
         Target::Gazebo => gazebo::write(export),
-    }
+    }?;
+    written.warnings.splice(0..0, export.axes().filter_map(Numbers::note));
+    Ok(written)
 }
 
 impl Export {
@@ -115,6 +117,10 @@ impl Export {
         self.gyro.iter().chain(&self.accelerometer)
     }
 
+    fn axes(&self) -> impl Iterator<Item = &Numbers> {
+        self.sensors().flat_map(|sensor| &sensor.axes)
+    }
+
     /// The comment block, each line behind `mark`; `interpretation`: what the consumer does with the numbers.
     fn head(&self, mark: &str, interpretation: &[&str]) -> String {
         let mut lines = self.origin.clone();
@@ -144,6 +150,7 @@ impl Export {
                         digits(process.correlation_time)
                     ));
                 }
+                lines.extend(axis.note());
                 if !axis.left_out.is_empty() {
                     lines.push(format!("{}: left out, no field for it: {}", axis.name, axis.left_out.join(", ")));
                 }
@@ -162,6 +169,7 @@ impl Export {
     fn walk_words(&self) -> Vec<String> {
         let mut words = vec![self.walk.words()];
         words.extend(self.price.iter().cloned());
+        words.extend(self.axes().filter_map(|axis| axis.walk_note(self.walk)));
         words
     }
 

@@ -46,8 +46,11 @@ pub struct GaussMarkov {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Numbers {
     pub name: String,
-    /// N, root of the two-sided density, unit/√Hz.
+    /// N, root of the two-sided density at low frequencies, unit/√Hz: what a consumer adds up over many samples. White noise, averaged or
+    /// not, and the density of oscillations at zero, which is next to nothing of a narrow line and most of N behind a low-pass in the sensor.
     pub white: Number,
+    /// N over that of the white noise alone.
+    pub oscillations: f64,
     /// K, unit/s/√Hz; zero when there is no drift.
     pub walk: Number,
     /// What the walk stands for.
@@ -101,10 +104,12 @@ impl Sensor {
 impl Numbers {
     fn new(axis: &AxisParams, dt: f64, rule: Walk) -> Result<Numbers, String> {
         let noise = axis.noise();
-        let density = noise.wideband_density();
-        if density <= 0.0 {
+        let wideband = noise.wideband_density();
+        if wideband <= 0.0 {
             return Err(format!("axis '{}' has no white noise; give axes[].white.density", axis.name));
         }
+        let oscillations = noise.terms.iter().filter(|term| matches!(term, Term::Oscillation { .. }));
+        let density = (wideband * wideband + oscillations.map(|term| term.psd(0.0, dt)).sum::<f64>()).sqrt();
         let mut processes = Vec::new();
         let (mut walk_square, mut left_out) = (0.0, Vec::new());
         for term in &noise.terms {
@@ -124,12 +129,37 @@ impl Numbers {
         let value = (walk_square + processes.iter().map(|p| p.growth(rule)).sum::<f64>()).sqrt();
         Ok(Numbers {
             name: axis.name.clone(),
-            white: Number { value: density, interval: white_interval(axis) },
+            // the interval is that of the white noise alone
+            white: Number { value: density, interval: white_interval(axis).filter(|_| density < 1.005 * wideband) },
+            oscillations: density / wideband,
             walk: Number { value, interval: walk_interval(axis, rule) },
             processes,
             rate_random_walk: walk_square.sqrt(),
             turn_on: axis.turn_on_bias.as_ref().map(Measured::si),
             left_out,
+        })
+    }
+
+    /// What must be known of these numbers.
+    pub fn note(&self) -> Option<String> {
+        (self.oscillations > 1.1).then(|| {
+            format!(
+                "{}: N is {:.2} times that of the white noise alone: it has the density of the oscillations at low frequencies, as behind a low-pass in the sensor",
+                self.name, self.oscillations
+            )
+        })
+    }
+
+    /// Where the walk of short times stands for processes that have long died away after a minute.
+    pub fn walk_note(&self, rule: Walk) -> Option<String> {
+        const MINUTE: Walk = Walk::Horizon(60.0);
+        let growth = |rule| self.processes.iter().map(|p| p.growth(rule)).sum::<f64>() + self.rate_random_walk.powi(2);
+        let ratio = (growth(Walk::Short) / growth(MINUTE)).sqrt();
+        (rule == Walk::Short && ratio > 3.0).then(|| {
+            format!(
+                "{}: K is that of the fastest drift and {ratio:.0} times that of --walk horizon=60s, which fits the drift over a minute",
+                self.name
+            )
         })
     }
 

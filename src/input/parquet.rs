@@ -88,7 +88,7 @@ impl ParquetTable {
             let all: Vec<String> = leaves
                 .iter()
                 .take(40)
-                .map(|found| format!("{} ({})", found.path().string(), found.physical_type()))
+                .map(|found| format!("{} ({})", printable(found.path().string().as_bytes()), found.physical_type()))
                 .collect();
             return fail(format!("a Parquet file without a column of numbers; there are {}", all.join(", ")));
         }

@@ -66,8 +66,7 @@ impl Course {
         progress(used);
     }
 
-    /// The eight runs from `first` on, of one axis.
-    /// `first` and the seven runs after it, at their start.
+    /// `first` and the seven runs after it, of one axis, at their start.
     pub(super) fn from(&self, number: u32, first: u64, scratch: &mut Scratch) -> Runs<'_> {
         self.start(number, std::array::from_fn(|l| first.saturating_add(l as u64)), scratch)
     }

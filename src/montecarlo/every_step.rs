@@ -52,7 +52,7 @@ pub(super) struct Judged {
     /// The same of ν²/S, by measurements, at those steps that have it.
     nis: Vec<Aligned>,
     /// 1 for the lanes that are runs, 0 for those beyond the last.
-    pub(super) used: Lane,
+    used: Lane,
     /// Σ over the runs so far, by steps.
     nees_sum: Vec<f64>,
     nis_sum: Vec<Vec<f64>>,

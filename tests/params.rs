@@ -1,7 +1,7 @@
 //! params.json: what is accepted, what is refused and how, the round trip, the schema.
 
 use kfdesign::noise::Term;
-use kfdesign::params::{AxisParams, Measured, NotIdentified, Params, Source, TemperatureEffect, TermEntry};
+use kfdesign::params::{AxisParams, Inflated, Measured, NotIdentified, Params, Source, TemperatureEffect, TermEntry};
 use kfdesign::units::{Quantity, Unit};
 use serde_json::{Value, json};
 
@@ -120,6 +120,7 @@ fn writing_and_reading_gives_the_same_document() {
             log: Some("a \"log\".csv".into()),
             samples: Some(u64::MAX),
             span_s: Some(12.5),
+            inflation: vec![Inflated { axis: "x".into(), factor: 7.5, interval: [7.25, 7.75] }],
             ..Source::default()
         }),
     };
@@ -221,6 +222,16 @@ fn each_complaint_names_file_key_and_reason() {
         (with("/axes/0/not_identified", json!([{"term": "white"}])), "axes[0].not_identified[0].reason: ", "missing"),
         (with("/source", json!({"samples": -1})), "source.samples: ", "whole number"),
         (with("/source", json!({"span": 3.0})), "source.span: ", "no unit"),
+        (
+            with("/source", json!({"inflation": [{"axis": "x", "factor": 0.0, "interval": [1, 2]}]})),
+            "source.inflation[0].factor: ",
+            "above zero",
+        ),
+        (
+            with("/source", json!({"inflation": [{"axis": "x", "factor": 2, "interval": [1]}]})),
+            "source.inflation[0].interval: ",
+            "found 1 values",
+        ),
     ];
     for (document, place, reason) in cases {
         let Err(message) = parse(&document) else { panic!("accepted: {place}{reason}\n{document:#}") };

@@ -105,6 +105,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         rate_hz: args.rate,
         sample_rate_hz: 0.0,
         inflation: args.inflate.unwrap_or(1.0),
+        measured_inflation: Vec::new(),
         choice: match args.axis.as_deref().unwrap_or("worst") {
             "worst" => Choice::Worst,
             "mean" => Choice::Mean,
@@ -152,6 +153,17 @@ fn add(export: &mut Export, path: &Path, params: &Params) -> anyhow::Result<()> 
     let hash = source.sha256.map_or_else(String::new, |hash| format!(" (sha256 {hash})"));
     let method = source.method.map_or_else(String::new, |method| format!(", {method}"));
     export.origin.push(format!("{shown}{log}{hash}{method}"));
+    export.measured_inflation.extend(source.inflation.iter().map(|found| {
+        let [low, high] = found.interval;
+        format!(
+            "inflation, measured: N of {} ({}) above is {} [{}, {}] times that of the bench",
+            found.axis,
+            params.quantity.name(),
+            digits(found.factor),
+            digits(low),
+            digits(high)
+        )
+    }));
     for (axis, numbers) in params.axes.iter().zip(&sensor.axes).filter(|(_, n)| !n.processes.is_empty()) {
         let price = walk_price(axis, params.quantity, 1.0 / params.sample_rate_hz, numbers.walk.value);
         if let Some(price) = price {

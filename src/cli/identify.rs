@@ -245,6 +245,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
             method: Some(args.method.method().name().into()),
             version: Some(env!("CARGO_PKG_VERSION").into()),
             note: None,
+            inflation: Vec::new(),
         }),
     };
     if let Some(path) = &args.output {

@@ -12,7 +12,7 @@ use super::{CompareError, Log, LogAxis, other_rate, paired};
 use crate::noise::{Kind, NoiseModel};
 use crate::numerics::distribution::{CHI_SQUARE_1_MEDIAN, NORMAL_95, chi_square_quantile};
 use crate::numerics::reduce::mean;
-use crate::params::{AxisParams, Params, Source, TermEntry};
+use crate::params::{AxisParams, Inflated, Params, Source, TermEntry};
 use crate::signal::lines::find_lines;
 use crate::units::{Quantity, digits};
 
@@ -290,6 +290,13 @@ pub fn inflated(params: &Params, found: &Inflation) -> Params {
         digits(found.from_hz)
     );
     let source = out.source.get_or_insert_with(Source::default);
+    for axis in &found.axes {
+        // what was inflated before is inflated once more
+        let before = source.inflation.iter().position(|known| known.axis == axis.name);
+        let before = before.map_or(1.0, |at| source.inflation.remove(at).factor);
+        let [factor, low, high] = [axis.factor, axis.interval[0], axis.interval[1]].map(|f| f * before);
+        source.inflation.push(Inflated { axis: axis.name.clone(), factor, interval: [low, high] });
+    }
     source.note = Some(source.note.take().map_or(note.clone(), |old| format!("{old}; {note}")));
     out
 }

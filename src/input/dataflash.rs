@@ -20,6 +20,9 @@ use batch::{Batch, Part};
 
 pub(super) const SIGNATURE: &[u8] = &[0xa3, 0x95, FORMAT];
 
+/// 256 types of messages, some of them of several sensors.
+const MOST_TOPICS: usize = 4096;
+
 const FORMAT: u8 = 128;
 const FORMAT_SIZE: usize = 89;
 
@@ -53,10 +56,8 @@ pub(super) fn open(path: &Path) -> Result<RecordSource, InputError> {
                 let sensor = batch.samples(form, at, &scanner.message, &mut rows);
                 let Some(sensor) = sensor.filter(|_| !rows.is_empty()) else { continue };
                 let name = sensor.name();
-                let topic = topics.iter().position(|topic| topic.name == name).unwrap_or_else(|| {
-                    topics.push(Topic::new(name, sensor.heads()));
-                    topics.len() - 1
-                });
+                let new = || Topic::new(name.clone(), sensor.heads());
+                let Some(topic) = place(&mut topics, &name, new) else { continue };
                 let columns = topics[topic].heads.len();
                 rows.chunks_exact(columns).for_each(|row| tally(&mut topics[topic], row.first().copied(), 1e-6));
                 continue;
@@ -65,12 +66,12 @@ pub(super) fn open(path: &Path) -> Result<RecordSource, InputError> {
         }
         let Some(time) = form.fields.first() else { continue };
         let name = form.topic(&scanner.message);
-        let at = topics.iter().position(|topic| topic.name == name).unwrap_or_else(|| {
+        let new = || {
             let heads: Vec<Head> = form.fields.iter().map(|field| field.head.clone()).collect();
             let raw = ["GYR", "ACC", "IMU"].iter().any(|sensor| form.name.starts_with(sensor));
-            topics.push(Topic { rank: u8::from(raw), ..Topic::new(name, heads) });
-            topics.len() - 1
-        });
+            Topic { rank: u8::from(raw), ..Topic::new(name.clone(), heads) }
+        };
+        let Some(at) = place(&mut topics, &name, new) else { continue };
         let unit_s = time.head.unit.as_ref().map_or(f64::NAN, |unit| unit.to_si(1.0));
         tally(&mut topics[at], unit_s.is_finite().then(|| time.decode(&scanner.message)), unit_s);
     }
@@ -85,6 +86,16 @@ pub(super) fn open(path: &Path) -> Result<RecordSource, InputError> {
     };
     let (format, path) = ("ArduPilot DataFlash log", path.to_path_buf());
     Ok(RecordSource { format, path, topics, messages: Box::new(messages) })
+}
+
+/// The number of a topic, which is made if it is new; none where there are too many.
+fn place(topics: &mut Vec<Topic>, name: &str, new: impl FnOnce() -> Topic) -> Option<usize> {
+    let found = topics.iter().position(|topic| topic.name == name);
+    if found.is_none() && topics.len() < MOST_TOPICS {
+        topics.push(new());
+        return Some(topics.len() - 1);
+    }
+    found
 }
 
 impl Form {

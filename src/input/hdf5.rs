@@ -24,6 +24,10 @@ pub(super) const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 
 const MOST_OBJECTS: usize = 10_000;
 const DEEPEST: usize = 16;
+/// Bytes of the file that may be read over and over: its structures are small and lie apart.
+const SPARE: u64 = 64 << 20;
+/// A structure costs so many bytes of that at least.
+const SMALLEST: u64 = 64;
 /// The address that means none.
 const NOWHERE: u64 = u64::MAX;
 
@@ -47,13 +51,17 @@ struct Store {
     /// Bytes of an address, and of a length.
     offsets: usize,
     lengths: usize,
-    /// Structures that may still be read: what points back at itself ends here.
-    budget: usize,
+    /// Bytes that may still be read: what points back at itself ends here.
+    budget: u64,
 }
 
 impl Store {
+    /// At the opening, and for each array: every byte some times.
+    fn afresh(&mut self) {
+        self.budget = SPARE.saturating_add(self.length.saturating_mul(16));
+    }
     fn read(&mut self, at: u64, count: u64) -> Result<Vec<u8>, String> {
-        self.budget = self.budget.checked_sub(1).ok_or("damaged: its structures have no end")?;
+        self.budget = self.budget.checked_sub(count.max(SMALLEST)).ok_or("damaged: its structures have no end")?;
         if at.checked_add(count).is_none_or(|end| end > self.length) {
             return Err(format!("truncated or damaged: {count} bytes at {at} lie beyond its end ({})", self.length));
         }
@@ -98,8 +106,8 @@ impl Hdf5 {
             return Err(format!("damaged: addresses of {offsets} bytes and lengths of {lengths}"));
         }
         let length = length - base as u64;
-        let budget = 100_000 + (length / 64) as usize;
-        let mut store = Store { file, base: base as u64, length, offsets, lengths, budget };
+        let mut store = Store { file, base: base as u64, length, offsets, lengths, budget: 0 };
+        store.afresh();
         let root = if version <= 1 {
             // reserved, tree sizes, flags; then four addresses and the name of the root
             bytes.take(1 + 4 + 4 + if version == 1 { 4 } else { 0 } + 4 * offsets + offsets)?;
@@ -197,6 +205,7 @@ impl ArrayFile for Hdf5 {
         &self.scalars
     }
     fn load(&mut self, array: usize, put: &mut Put) -> Result<(), InputError> {
+        self.store.afresh();
         let (dataset, matlab) = (&self.datasets[array], self.matlab);
         let fields = self.arrays[array].fields.len();
         let loaded = dataset.load(&mut self.store, &mut |first, second, bytes| match fields {

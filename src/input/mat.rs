@@ -20,8 +20,10 @@ const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
 const DEEPEST: usize = 8;
 const MOST_ARRAYS: usize = 10_000;
-/// Names and shapes are shorter.
-const LONGEST_NAME: u32 = 1 << 20;
+/// Names of the fields of a structure are shorter, all together.
+const MOST_NAMES: u32 = 1 << 20;
+/// MATLAB's names have at most 63 letters.
+const LONGEST_NAME: usize = 256;
 
 pub(super) struct Mat {
     path: PathBuf,
@@ -208,7 +210,7 @@ impl Walker<'_> {
         if let Some(data) = inside {
             return Ok(data[..size as usize].to_vec());
         }
-        if size > LONGEST_NAME {
+        if size > MOST_NAMES {
             return Err(bad("a name or shape of over 1 MiB"));
         }
         let mut data = Vec::new();
@@ -238,6 +240,9 @@ impl Walker<'_> {
             .map(|b| u64::from(if self.big_endian { u32::from_be_bytes(b) } else { u32::from_le_bytes(b) }))
             .collect();
         let name = self.short(from)?;
+        if name.len() > LONGEST_NAME {
+            return Err(bad("a name of over 256 bytes"));
+        }
         let path = if depth == 0 { super::bytes::printable(&name) } else { outer.to_string() };
         let [rows, columns] = shape[..] else { return Ok(()) };
         match class {
@@ -254,6 +259,9 @@ impl Walker<'_> {
             [a, b, c, d] => u32::from_le_bytes([a, b, c, d]),
             _ => return Err(bad("a structure without field names")),
         };
+        if length as usize > LONGEST_NAME {
+            return Err(bad("a name of over 256 bytes"));
+        }
         let names = self.short(from)?;
         let names: Vec<String> = names.chunks(length.max(1) as usize).map(super::bytes::Bytes::text).collect();
         for element in 1..=count.min(MOST_ARRAYS as u64) {

@@ -3,10 +3,10 @@
 //! Format: Apache Parquet, parquet-format 2.x. The crate `parquet` reads metadata, pages and encodings; compressed pages are unpacked by
 //! `pages`. Text, lists and maps are passed over; the fields of a structure are the columns `imu.gyro_x`.
 
+mod guard;
 mod pages;
 
 use std::fs::File;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -17,7 +17,8 @@ use parquet::errors::ParquetError;
 use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader};
 use parquet::schema::types::ColumnDescriptor;
 
-use self::pages::Pages;
+use self::guard::guarded;
+use self::pages::{Disk, Pages};
 use super::bytes::printable;
 use super::names::Head;
 use super::number::{Kind, Number, Split, since};
@@ -29,7 +30,7 @@ pub(super) const ENCRYPTED: &[u8] = b"PARE";
 
 pub(super) struct ParquetTable {
     path: PathBuf,
-    file: Arc<File>,
+    file: Arc<Disk>,
     metadata: ParquetMetaData,
     columns: Vec<Column>,
     time: Option<usize>,
@@ -76,11 +77,11 @@ impl ParquetTable {
             Ok(file) => file,
             Err(error) => return fail(format!("cannot read: {error}")),
         };
-        let metadata = match ParquetMetaDataReader::new().parse_and_finish(&file) {
-            Ok(metadata) => metadata,
-            Err(error) => {
-                return fail(format!("truncated or damaged: its table of contents cannot be read ({})", plain(&error)));
-            }
+        let contents = "truncated or damaged: its table of contents cannot be read";
+        let metadata = match guarded(|| ParquetMetaDataReader::new().parse_and_finish(&file)) {
+            Some(Ok(metadata)) => metadata,
+            Some(Err(error)) => return fail(format!("{contents} ({})", plain(&error))),
+            None => return fail(contents.into()),
         };
         let leaves = metadata.file_metadata().schema_descr().columns();
         let columns: Vec<Column> = leaves.iter().enumerate().filter_map(|(leaf, found)| column(leaf, found)).collect();
@@ -94,7 +95,7 @@ impl ParquetTable {
         }
         Ok(ParquetTable {
             path: path.to_path_buf(),
-            file: Arc::new(file),
+            file: Arc::new(Disk(file)),
             metadata,
             columns,
             time: None,
@@ -176,11 +177,10 @@ impl Table for ParquetTable {
             numbers.clear();
             let levels = descriptor.max_def_level();
             // pages that are damaged can make the crate panic
-            let result = catch_unwind(AssertUnwindSafe(|| read(reader, *number, levels, count, &mut numbers)));
-            match result {
-                Ok(Ok(())) => {}
-                Ok(Err(error)) => return self.fail(&format!("{}: {}", name(&descriptor), plain(&error))),
-                Err(_) => return self.fail(&format!("{}: a damaged page", name(&descriptor))),
+            match guarded(|| read(reader, *number, levels, count, &mut numbers)) {
+                Some(Ok(())) => {}
+                Some(Err(error)) => return self.fail(&format!("{}: {}", name(&descriptor), plain(&error))),
+                None => return self.fail(&format!("{}: a damaged page", name(&descriptor))),
             }
             if numbers.len() != count {
                 return self.fail(&format!("{} has fewer rows than it declares", name(&descriptor)));

@@ -36,10 +36,19 @@ struct Pages {
     damaged: u64,
 }
 
-/// A place in a tree: pages from the root down, each with its next cell.
+/// A place in a tree: pages from the root down.
 #[derive(Default)]
 struct Walk {
-    stack: Vec<(u32, Vec<u8>, usize)>,
+    stack: Vec<Place>,
+}
+
+struct Place {
+    number: u32,
+    page: Vec<u8>,
+    /// The next cell.
+    cell: usize,
+    /// Bytes that cells may still have: they do not overlap, also where damaged pointers say so.
+    left: usize,
 }
 
 /// One value of a row.
@@ -80,8 +89,8 @@ impl Pages {
         Ok(page)
     }
 
-    /// Content of a cell of a leaf: the number of its row, and the row.
-    fn cell(&mut self, page: &[u8], at: usize) -> Result<(u64, Vec<u8>), Short> {
+    /// Content of a cell of a leaf: the number of its row, and the row. `left`: bytes that cells of this page may still have.
+    fn cell(&mut self, page: &[u8], at: usize, left: &mut usize) -> Result<(u64, Vec<u8>), Short> {
         let mut bytes = Bytes(page.get(at..).ok_or(Short)?);
         let size = varint(&mut bytes)?;
         let row = varint(&mut bytes)?;
@@ -95,6 +104,7 @@ impl Pages {
             _ if size <= most => size,
             _ => Some(least + (size - least) % (usable - 4)).filter(|n| *n <= most).unwrap_or(least),
         };
+        *left = left.checked_sub(here).ok_or(Short)?;
         let mut content = bytes.take(here)?.to_vec();
         if here < size {
             let mut next = big(bytes.take(4)?) as u32;
@@ -110,7 +120,7 @@ impl Pages {
 
     /// The next row of a table.
     fn next(&mut self, walk: &mut Walk) -> Option<(u64, Vec<u8>)> {
-        while let Some((number, page, cell)) = walk.stack.last_mut() {
+        while let Some(Place { number, page, cell, left }) = walk.stack.last_mut() {
             let start = if *number == 1 { 100 } else { 0 };
             let (kind, count) = (page[start], big(&page[start + 3..start + 5]) as usize);
             let pointers = start + if kind == INTERIOR { 12 } else { 8 };
@@ -119,12 +129,7 @@ impl Pages {
             let place = page.get(pointers + 2 * index..pointers + 2 * index + 2).map(|two| big(two) as usize);
             let child = match (kind, place) {
                 (LEAF, Some(at)) if index < count => {
-                    let page = std::mem::take(page);
-                    let found = self.cell(&page, at);
-                    if let Some((_, kept, _)) = walk.stack.last_mut() {
-                        *kept = page;
-                    }
-                    match found {
+                    match self.cell(page, at, left) {
                         Ok(found) => return Some(found),
                         Err(Short) => self.damaged += 1,
                     }
@@ -152,7 +157,7 @@ impl Pages {
 
     fn enter(&mut self, walk: &mut Walk, page: u32) {
         match self.page(page) {
-            Ok(content) => walk.stack.push((page, content, 0)),
+            Ok(content) => walk.stack.push(Place { number: page, page: content, cell: 0, left: self.usable }),
             Err(Short) => self.damaged += 1,
         }
     }

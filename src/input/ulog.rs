@@ -20,8 +20,10 @@ pub(super) const SIGNATURE: &[u8] = b"ULog\x01\x12\x35";
 const SYNC: &[u8] = &[0x2f, 0x73, 0x13, 0x20, 0x25, 0x0c, 0xbb, 0x12];
 const KINDS: &[u8] = b"BFIMPQARDLCSO";
 const DEEPEST: usize = 8;
-/// A message has at most 65,535 bytes.
-const MOST_FIELDS: usize = 1 << 16;
+/// A message has at most 65,535 bytes; that of the most fields, some hundred.
+const MOST_FIELDS: usize = 1 << 13;
+/// Of all topics.
+const MOST_COLUMNS: usize = 1 << 16;
 /// Topics are numbered by 16 bits.
 const MOST_TOPICS: usize = 1 << 16;
 
@@ -108,7 +110,7 @@ pub(super) fn open(path: &Path) -> Result<RecordSource, InputError> {
     let (mut topics, mut layouts): (Vec<Topic>, Vec<Layout>) = (Vec::new(), Vec::new());
     // the number of a message is given anew where a topic ends
     let mut numbers: BTreeMap<u16, usize> = BTreeMap::new();
-    let mut row = Vec::new();
+    let (mut row, mut columns) = (Vec::new(), 0);
     while let Some(kind) = scanner.next().map_err(fail)? {
         let mut content = Bytes(&scanner.message);
         match kind {
@@ -126,7 +128,9 @@ pub(super) fn open(path: &Path) -> Result<RecordSource, InputError> {
                     numbers.insert(number, at);
                 } else if let Some((layout, heads)) = layout(&format, &formats)
                     && topics.len() < MOST_TOPICS
+                    && columns + heads.len() <= MOST_COLUMNS
                 {
+                    columns += heads.len();
                     let rank = match SENSORS.iter().any(|(sensor, _)| *sensor == format) {
                         true => 1 + u8::from(format != FILTERED),
                         false => 0,

@@ -7,7 +7,7 @@ use serde::{Serialize, Serializer};
 
 use super::measured::Range;
 use super::place::{KeyError, Object, Place};
-use super::{AxisParams, Design, Measured, NotIdentified, Params, Source, TemperatureEffect, TermEntry};
+use super::{AxisParams, Design, Inflated, Measured, NotIdentified, Params, Source, TemperatureEffect, TermEntry};
 use crate::units::{Dimension, Quantity, Unit};
 
 pub(super) const FORMAT: &str = "kfdesign-params/1";
@@ -194,6 +194,9 @@ struct SourceDocument {
     version: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     note: Option<String>,
+    /// What the white noise was multiplied with after the bench, by axis.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    inflation: Vec<Inflated>,
 }
 
 fn in_unit(value: f64, unit: &str) -> Option<Measured> {
@@ -271,6 +274,7 @@ impl From<&Source> for SourceDocument {
             method: source.method.clone(),
             version: source.version.clone(),
             note: source.note.clone(),
+            inflation: source.inflation.clone(),
         }
     }
 }
@@ -446,7 +450,7 @@ fn seconds(object: &Object<'_>, key: &str) -> Result<Option<f64>, KeyError> {
 }
 
 fn source(place: &Place<'_>) -> Result<Source, KeyError> {
-    let object = place.object(&["log", "sha256", "samples", "span", "method", "version", "note"])?;
+    let object = place.object(&["log", "sha256", "samples", "span", "method", "version", "note", "inflation"])?;
     let text = |key: &str| object.optional(key).map(|p| p.text().map(str::to_string)).transpose();
     Ok(Source {
         log: text("log")?,
@@ -456,5 +460,27 @@ fn source(place: &Place<'_>) -> Result<Source, KeyError> {
         method: text("method")?,
         version: text("version")?,
         note: text("note")?,
+        inflation: match object.optional("inflation") {
+            Some(list) => list.list()?.iter().map(inflated).collect::<Result<_, _>>()?,
+            None => Vec::new(),
+        },
+    })
+}
+
+fn inflated(place: &Place<'_>) -> Result<Inflated, KeyError> {
+    let object = place.object(&["axis", "factor", "interval"])?;
+    let positive = |place: &Place<'_>| match place.number()? {
+        value if value > 0.0 => Ok(value),
+        value => Err(place.error(format!("{value}, expected a factor above zero"))),
+    };
+    let interval = object.required("interval")?;
+    let ends = interval.list()?.iter().map(positive).collect::<Result<Vec<_>, _>>()?;
+    let [low, high] = ends[..] else {
+        return Err(interval.error(format!("expected [lower, upper], found {} values", ends.len())));
+    };
+    Ok(Inflated {
+        axis: object.required("axis")?.text()?.to_string(),
+        factor: positive(&object.required("factor")?)?,
+        interval: [low, high],
     })
 }

@@ -11,6 +11,9 @@ pub mod place;
 
 use std::path::Path;
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use crate::noise::{NoiseModel, Term};
 use crate::units::{Quantity, Unit, UnitError};
 
@@ -70,6 +73,17 @@ pub struct AxisParams {
     pub not_identified: Vec<NotIdentified>,
 }
 
+/// What the white noise of an axis was multiplied with after the bench.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Inflated {
+    pub axis: String,
+    /// On the densities of white and moving_average.
+    pub factor: f64,
+    /// 95 % of the factor.
+    pub interval: [f64; 2],
+}
+
 /// Where the numbers come from.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Source {
@@ -81,6 +95,8 @@ pub struct Source {
     pub version: Option<String>,
     /// Free text: datasheet, paper, address.
     pub note: Option<String>,
+    /// By axis, where `inflate` measured it; empty: as identified.
+    pub inflation: Vec<Inflated>,
 }
 
 #[derive(Clone, Debug, PartialEq)]

@@ -136,6 +136,29 @@ fn the_command() {
     let written: serde_json::Value = serde_json::from_str(&bench.read("inflated.json")).unwrap();
     let before: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&params).unwrap()).unwrap();
     assert_eq!(written["axes"][1]["gauss_markov"], before["axes"][1]["gauss_markov"]);
+    // a file made of it says what is in it; a second time, both; without the factor of its own
+    let factors = written["source"]["inflation"].as_array().unwrap();
+    assert_eq!(factors.len(), 3);
+    let number = |key: &serde_json::Value| digits(key.as_f64().unwrap());
+    let (x, end) = (&factors[0], |i: usize| number(&factors[0]["interval"][i]));
+    assert!((x["factor"].as_f64().unwrap() / 5.0 - 1.0).abs() < 6.0 * 0.0072, "{x}");
+    let exported = bench.ok("export inflated.json --to kalibr");
+    let line = format!(
+        "# inflation, measured: N of x (angular rate) above is {} [{}, {}] times that of the bench\n",
+        number(&x["factor"]),
+        end(0),
+        end(1)
+    );
+    assert!(exported.contains(&line) && exported.contains("# inflation: none beyond that\n"), "{exported}");
+    assert!(exported.contains("# drift as identified at rest"), "{exported}");
+    let both = bench.ok("export inflated.json --to kalibr --inflate 2");
+    assert!(both.contains(&line) && both.contains("are 2 times those above"), "{both}");
+    assert!(bench.ok(&format!("export {params} --to kalibr")).contains("# inflation: none\n"));
+    bench.ok("inflate inflated.json flight.npy -o again.json");
+    let again: serde_json::Value = serde_json::from_str(&bench.read("again.json")).unwrap();
+    let twice = &again["source"]["inflation"][0];
+    assert!((twice["factor"].as_f64().unwrap() / x["factor"].as_f64().unwrap() - 1.0).abs() < 1e-3, "{twice}");
+    assert_eq!(again["source"]["inflation"].as_array().unwrap().len(), 3);
     let schema: serde_json::Value = serde_json::from_str(&bench.ok("schema inflate")).unwrap();
     assert_eq!(
         schema["properties"].as_object().unwrap().keys().collect::<Vec<_>>(),

@@ -18,6 +18,8 @@ const NEWER: &[u8] = include_bytes!("written/newer.parquet");
 const POLARS: &[u8] = include_bytes!("written/polars.parquet");
 /// Stamps of twelve bytes.
 const TWELVE: &[u8] = include_bytes!("written/twelve.parquet");
+/// Differences, not compressed.
+const DELTA: &[u8] = include_bytes!("written/delta.parquet");
 const BROTLI: &[u8] = include_bytes!("written/brotli.parquet");
 
 /// Column k as `write_parquet.py` makes it.
@@ -96,6 +98,30 @@ fn what_is_not_read_is_refused_by_name() {
         "{}",
         refused(&damaged, &[])
     );
+}
+
+/// Of the crate `parquet`: it panics on a number of more than ten bytes, and nothing of it is seen.
+#[test]
+fn a_panic_over_a_damaged_page_is_one_line() {
+    let (log, _) = read_bytes("log.parquet", DELTA, &[("rate", "100")]).unwrap();
+    assert_close(&shown(&log, 0), &(0..40).map(|i| f64::from(7 * i % 11)).collect::<Vec<_>>(), "delta");
+    let mut damaged = DELTA.to_vec();
+    let page = DELTA.windows(4).position(|bytes| bytes == [0x80, 1, 4, 40]).unwrap();
+    damaged[page..page + 11].fill(0xff);
+    let bench = Bench::new();
+    bench.file("log.parquet", &damaged);
+    let out = bench.run("allan log.parquet --rate 100");
+    let line = "kfdesign: log.parquet: row group 1: column 'gyro_x (deg/s)': a damaged page\n";
+    assert_eq!((out.status, out.stdout.as_str(), out.stderr.as_str()), (2, "", line));
+}
+
+/// A page header that declares a list of 2^31 numbers, each of which the crate `parquet` would look for behind the end of the file.
+#[test]
+fn a_header_that_declares_more_than_the_file_has_ends() {
+    let mut damaged = DELTA.to_vec();
+    damaged[4..11].copy_from_slice(&[0xf9, 0xf7, 0xff, 0xff, 0xff, 0xff, 0x07]);
+    let message = read_bytes("log.parquet", &damaged, &[("rate", "100")]).unwrap_err();
+    assert!(message.starts_with("log.parquet: row group 1: column 'gyro_x (deg/s)': "), "{message}");
 }
 
 #[test]

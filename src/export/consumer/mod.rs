@@ -47,6 +47,8 @@ pub struct Export {
     pub sample_rate_hz: f64,
     /// Factor on every white density and every drift; 1 is none.
     pub inflation: f64,
+    /// Lines about the factors that the white noise of the parameters has in it already.
+    pub measured_inflation: Vec<String>,
     pub choice: Choice,
     pub walk: Walk,
     /// Lines about the origin, for the comment block.
@@ -156,11 +158,20 @@ impl Export {
                 }
             }
         }
-        lines.push("identified at rest: a lower bound of what a moving vehicle shows".into());
-        lines.push(if self.inflation == 1.0 {
-            "inflation: none".into()
-        } else {
-            format!("inflation: N and K (and sigma) below are {} times those above", digits(self.inflation))
+        lines.push(
+            match self.measured_inflation.is_empty() {
+                true => "identified at rest: a lower bound of what a moving vehicle shows",
+                false => "drift as identified at rest: a lower bound of what a moving vehicle shows",
+            }
+            .into(),
+        );
+        lines.extend(self.measured_inflation.iter().cloned());
+        lines.push(match (self.inflation == 1.0, self.measured_inflation.is_empty()) {
+            (true, true) => "inflation: none".into(),
+            (true, false) => "inflation: none beyond that".into(),
+            (false, _) => {
+                format!("inflation: N and K (and sigma) below are {} times those above", digits(self.inflation))
+            }
         });
         lines.iter().map(|line| format!("{mark} {line}\n")).collect()
     }

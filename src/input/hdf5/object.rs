@@ -7,6 +7,7 @@ use super::filters::{self, Filter};
 use super::{DEEPEST, MOST_OBJECTS, NOWHERE, Store};
 
 const LONGEST_ATTRIBUTE: u64 = 1 << 16;
+const LONGEST_NAME: usize = 1024;
 
 /// A dataset as its header describes it.
 #[derive(Clone, Debug)]
@@ -231,7 +232,7 @@ fn symbols(
                 bytes.take(20)?;
                 let name =
                     usize::try_from(name).ok().and_then(|at| names.get(at..)).ok_or("damaged: a name is missing")?;
-                links.push((Bytes::text(name), object));
+                links.push((Bytes::text(&name[..name.len().min(LONGEST_NAME)]), object));
             }
         }
         _ => return Err("damaged: a group without members".into()),

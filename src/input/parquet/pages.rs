@@ -1,22 +1,57 @@
 //! The pages of a column, unpacked here: in Rust alone, and never to more bytes than the file declares for the column.
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::sync::Arc;
 
 use parquet::basic::{Compression, Encoding};
 use parquet::column::page::{Page, PageMetadata, PageReader};
 use parquet::errors::{ParquetError, Result};
 use parquet::file::metadata::ColumnChunkMetaData;
-use parquet::file::reader::Length;
+use parquet::file::reader::{ChunkReader, Length};
 use parquet::file::serialized_reader::SerializedPageReader;
 
 use crate::input::bytes::zstd;
 
+/// The file of the pages. Reading on at its end is an error here: the crate passes over the elements of a damaged header one by one, as many as
+/// it declares, also where there are none left.
+pub(super) struct Disk(pub(super) File);
+
+/// Reads up to the end of the file, and no further.
+pub(super) struct UpToEnd(File);
+
+impl Read for UpToEnd {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        match self.0.read(buffer)? {
+            0 if !buffer.is_empty() => Err(std::io::ErrorKind::UnexpectedEof.into()),
+            count => Ok(count),
+        }
+    }
+}
+
+impl Length for Disk {
+    fn len(&self) -> u64 {
+        self.0.len()
+    }
+}
+
+impl ChunkReader for Disk {
+    type T = BufReader<UpToEnd>;
+
+    fn get_read(&self, start: u64) -> Result<Self::T> {
+        let mut file = self.0.try_clone()?;
+        file.seek(SeekFrom::Start(start))?;
+        Ok(BufReader::new(UpToEnd(file)))
+    }
+    fn get_bytes(&self, start: u64, length: usize) -> Result<bytes::Bytes> {
+        self.0.get_bytes(start, length)
+    }
+}
+
 /// The pages of one column of one row group, in order.
 pub(super) struct Pages {
     /// As they are stored.
-    stored: SerializedPageReader<File>,
+    stored: SerializedPageReader<Disk>,
     compression: Compression,
     /// Bytes that the pages may still have, unpacked.
     left: usize,
@@ -28,7 +63,7 @@ fn fault(what: impl Into<String>) -> ParquetError {
 }
 
 impl Pages {
-    pub(super) fn open(file: &Arc<File>, column: &ColumnChunkMetaData, rows: usize) -> Result<Pages> {
+    pub(super) fn open(file: &Arc<Disk>, column: &ColumnChunkMetaData, rows: usize) -> Result<Pages> {
         let starts = [column.dictionary_page_offset(), Some(column.data_page_offset())];
         let start = starts.into_iter().flatten().min().unwrap_or(-1);
         let end = start.checked_add(column.compressed_size()).and_then(|end| u64::try_from(end).ok());

@@ -25,6 +25,8 @@ const STARTUP: usize = 1024;
 const LARGEST_SPREAD: f64 = 0.35;
 const RARE: f64 = 0.02;
 const LARGEST_MISSING_SHARE: f64 = 0.3;
+/// A gap is counted up to here, some years of any sensor: sums over all gaps do not overflow. Longer ones come from damaged stamps.
+const LONGEST_GAP: u64 = 1 << 40;
 
 /// The step that ends at `place` and covers `periods` rows.
 #[derive(Clone, Copy, Debug)]
@@ -289,7 +291,8 @@ impl Stamps {
         let inside = all.saturating_sub(long.iter().map(|s| s.periods).sum());
         let regular = (self.last - self.first) - long.iter().map(|s| s.seconds).sum::<f64>();
         let period = if inside > 0 && self.backward.count == 0 { regular / inside as f64 } else { step };
-        let missing = |step: &Step| ((step.seconds / period).round() as u64).saturating_sub(step.periods);
+        let missing =
+            |step: &Step| ((step.seconds / period).round() as u64).saturating_sub(step.periods).min(LONGEST_GAP);
         let open: Vec<&Step> = long.iter().filter(|step| missing(step) > 0).collect();
         let gaps: Vec<Gap> =
             open.iter().map(|step| Gap { index: step.place.index as usize, missing: missing(step) }).collect();
@@ -378,6 +381,16 @@ mod tests {
         assert!(timing.usable);
         assert_eq!(timing.gaps.iter().map(|g| g.missing).sum::<u64>(), 1000);
         assert!((timing.period - 0.005).abs() < 1e-9);
+    }
+
+    /// Damaged stamps: sums of what is missing do not overflow.
+    #[test]
+    fn gaps_without_measure_are_counted_up_to_a_bound() {
+        let mut times = regular(5000, 0.01);
+        times[3000..].iter_mut().for_each(|t| *t += 1e18);
+        times[4000..].iter_mut().for_each(|t| *t += 1e200);
+        let timing = timing(&times);
+        assert_eq!(timing.gaps.iter().map(|gap| gap.missing).collect::<Vec<_>>(), [LONGEST_GAP; 2]);
     }
 
     #[test]

@@ -58,3 +58,9 @@ polars.DataFrame({"time (ms)": 10 * np.arange(ROWS), **gyro}).write_parquet("pol
 frame = pandas.DataFrame({"stamp": pandas.to_datetime(STAMPS), **gyro})
 fastparquet.write("twelve.parquet", frame, times="int96")
 frame.set_index("stamp").rename_axis(None).to_parquet("index.parquet")
+
+# differences without compression, so that a test can damage them
+counts = pa.table({"gyro_x (deg/s)": pa.array(7 * np.arange(ROWS) % 11, pa.int32())})
+packed = {"gyro_x (deg/s)": "DELTA_BINARY_PACKED"}
+bare = {"write_statistics": False, "store_schema": False, "use_dictionary": False}
+pq.write_table(counts, "delta.parquet", compression="none", column_encoding=packed, **bare)

@@ -1,0 +1,5 @@
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| -> libfuzzer_sys::Corpus {
+    kfdesign_fuzz::read(b"\x89HDF\r\n\x1a\n", bytes)
+});

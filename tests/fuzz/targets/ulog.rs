@@ -1,0 +1,5 @@
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| -> libfuzzer_sys::Corpus {
+    kfdesign_fuzz::read(b"ULog\x01\x12\x35", bytes)
+});

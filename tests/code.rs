@@ -186,11 +186,7 @@ fn generated_code_is_replay_on_measured_logs() {
     }
     let check = |language: &str, found: Vec<Vec<f64>>| {
         for (case, found) in cases.iter().zip(found) {
-            let limits = match (case.float, case.what.starts_with("vertical")) {
-                (false, _) => &Limits::DOUBLE,
-                (true, false) => &Limits::SINGLE,
-                (true, true) => &Limits::SINGLE_CLOSE,
-            };
+            let limits = if case.float { &Limits::SINGLE } else { &Limits::DOUBLE };
             compare(language, case, &found, limits);
         }
     };

@@ -10,6 +10,8 @@ mod damage;
 mod every_file;
 #[path = "input/measured.rs"]
 mod measured;
+#[path = "input/memory.rs"]
+mod memory;
 #[path = "input/messages.rs"]
 mod messages;
 #[path = "input/npy.rs"]

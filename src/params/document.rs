@@ -195,7 +195,7 @@ struct SourceDocument {
     #[serde(skip_serializing_if = "Option::is_none")]
     note: Option<String>,
     /// What the white noise was multiplied with after the bench, by axis.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     inflation: Vec<Inflated>,
 }
 

@@ -97,9 +97,6 @@ pub(super) struct Limits {
 
 impl Limits {
     pub(super) const SINGLE: Limits = Limits { innovation: 1e-6, variance: 1e-6, state: 1e-5, spread: 1e-5 };
-    /// Tilt and disturbance of an accelerometer are each known twenty times worse than their sum: S is a small difference of large numbers, of which
-    /// a rounding is 400 times as large.
-    pub(super) const SINGLE_CLOSE: Limits = Limits { innovation: 1e-5, variance: 5e-5, state: 5e-5, spread: 1e-5 };
     pub(super) const DOUBLE: Limits = Limits { innovation: 1e-12, variance: 1e-12, state: 1e-12, spread: 1e-12 };
 }
 

@@ -144,7 +144,7 @@ fn the_command() {
     assert!((x["factor"].as_f64().unwrap() / 5.0 - 1.0).abs() < 6.0 * 0.0072, "{x}");
     let exported = bench.ok("export inflated.json --to kalibr");
     let line = format!(
-        "# inflation, measured: N of x (angular rate) above is {} [{}, {}] times that of the bench\n",
+        "# inflation, measured: N of x (angular-rate) above is {} [{}, {}] times that of the bench\n",
         number(&x["factor"]),
         end(0),
         end(1)
@@ -152,7 +152,7 @@ fn the_command() {
     assert!(exported.contains(&line) && exported.contains("# inflation: none beyond that\n"), "{exported}");
     assert!(exported.contains("# drift as identified at rest"), "{exported}");
     let both = bench.ok("export inflated.json --to kalibr --inflate 2");
-    assert!(both.contains(&line) && both.contains("are 2 times those above"), "{both}");
+    assert!(both.contains(&line) && both.contains("are 2.000 times those above"), "{both}");
     assert!(bench.ok(&format!("export {params} --to kalibr")).contains("# inflation: none\n"));
     bench.ok("inflate inflated.json flight.npy -o again.json");
     let again: serde_json::Value = serde_json::from_str(&bench.read("again.json")).unwrap();

@@ -99,6 +99,15 @@ fn damaged_files_end_in_one_line() {
     }
 }
 
+/// `cargo test --release -- --ignored --nocapture ten_thousand_changes`
+#[test]
+#[ignore = "takes minutes"]
+fn ten_thousand_changes_of_array_files() {
+    for (name, bytes) in WRITTEN {
+        damage::ten_thousand(name, bytes, &[("unit", "deg/s"), ("time", "none")]);
+    }
+}
+
 const BROAD: Flags = &[("unit", "rad/s")];
 const BROAD_FORCE: Flags = &[("unit", "m/s^2")];
 const BUFFER: Flags = &[("unit", "deg/s"), ("time", "gyroBuffer_1:s"), ("columns", "2,3,4")];

@@ -136,9 +136,6 @@ fn damaged_parquet_files_end() {
 #[ignore = "takes minutes"]
 fn ten_thousand_changes_of_parquet_files() {
     for (name, bytes) in USUAL.into_iter().chain([("newer", NEWER), ("polars", POLARS), ("twelve", TWELVE)]) {
-        let slowest = damage::survives(name, bytes, &[&[("unit", "deg/s")]], 10_000);
-        let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-        let peak = status.lines().find(|line| line.starts_with("VmHWM")).unwrap_or_default();
-        println!("{name}: {} bytes, slowest {slowest:?}, process {peak}", bytes.len());
+        damage::ten_thousand(name, bytes, &[("unit", "deg/s")]);
     }
 }

@@ -213,7 +213,8 @@ impl Dataset {
                 if count > wanted {
                     return Err("damaged: more blocks than the numbers need".into());
                 }
-                let entries = store.read(block + 6 + store.offsets as u64, count.saturating_mul(u64::from(size)))?;
+                let entries = store
+                    .read(block.saturating_add(6 + store.offsets as u64), count.saturating_mul(u64::from(size)))?;
                 for i in 0..count {
                     let entry = &mut Bytes(&entries[i as usize * usize::from(size)..]);
                     let address = store.address(entry)?;

@@ -27,10 +27,10 @@ pub(super) fn parse(mut bytes: Bytes) -> Result<Vec<Filter>, String> {
     let mut filters = Vec::new();
     for _ in 0..count {
         let id = bytes.u16()?;
-        let name = if version == 1 || id >= 256 { bytes.u16()? } else { 0 };
+        let name = usize::from(if version == 1 || id >= 256 { bytes.u16()? } else { 0 });
         let _flags = bytes.u16()?;
         let values = bytes.u16()?;
-        bytes.take(if version == 1 { name.div_ceil(8) * 8 } else { name } as usize)?;
+        bytes.take(if version == 1 { name.div_ceil(8) * 8 } else { name })?;
         let mut first = 0;
         for i in 0..values {
             let value = bytes.u32()?;
@@ -136,4 +136,19 @@ fn lzf(data: &[u8], most: usize) -> Option<Vec<u8>> {
         }
     }
     Some(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Its padding would be counted beyond 16 bits.
+    #[test]
+    fn a_name_longer_than_the_message_is_refused() {
+        let name = [1, 0, 0xff, 0xff, 0, 0, 0, 0];
+        let message: Vec<u8> = [1, 1, 0, 0, 0, 0, 0, 0].into_iter().chain(name).collect();
+        assert!(parse(Bytes(&message)).is_err());
+        let message: Vec<u8> = [1, 1, 0, 0, 0, 0, 0, 0].into_iter().chain([1, 0, 0, 0, 0, 0, 0, 0]).collect();
+        assert_eq!(parse(Bytes(&message)).unwrap(), [Filter::Deflate]);
+    }
 }

@@ -2,6 +2,8 @@
 
 mod ahead;
 mod digits;
+#[cfg(target_arch = "x86_64")]
+mod eights;
 mod fast;
 mod row;
 

@@ -4,6 +4,9 @@
 //! division or product is correctly rounded (Clinger 1990, "How to read floating point numbers accurately"). Otherwise, for |e| ≤ 27,
 //! 5^|e| fits into 64 bits, so m·5^e or the first 62 bits of m/5^|e| and whether anything follows are found in integers and rounded once.
 
+#[cfg(target_arch = "x86_64")]
+use super::eights;
+
 /// Bytes that must stand before a digit that is read.
 pub(super) const LEAD: usize = 32;
 /// 10^e and 5^e are known up to here.
@@ -44,7 +47,41 @@ pub(super) trait Bytes: Copy {
     fn others(self, text: &[u8; 32]) -> u32;
     /// The last `count` bytes, which are digits, as a number.
     fn sixteen(self, text: &[u8; 16], count: usize) -> u64;
+    /// The places of the bits that are set, behind `at`.
+    #[inline(always)]
+    fn places(self, mut bits: u64, at: u32, places: &mut [u32; 80]) {
+        // four at a time: how many there are is less of a surprise
+        for four in places.as_chunks_mut::<4>().0 {
+            for place in four {
+                *place = at + bits.trailing_zeros();
+                bits &= bits.wrapping_sub(1);
+            }
+            if bits == 0 {
+                break;
+            }
+        }
+    }
+    /// Eight fields as numbers, where that is quicker than one by one.
+    #[inline(always)]
+    fn numbers(self, _fields: &Eight, _point: u8) -> Option<Numbers> {
+        None
+    }
+    /// Eight stamps since `origin` (an integer, and what is behind its point), likewise.
+    #[inline(always)]
+    fn stamps(self, _fields: &Eight, _point: u8, _origin: (i64, f64)) -> Option<Numbers> {
+        None
+    }
 }
+
+/// The last 24 bytes of eight fields, the last eight bytes first, and how long each field is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Eight {
+    pub(super) words: [[u64; 8]; 3],
+    pub(super) lengths: [u64; 8],
+}
+
+/// Eight numbers, and one bit for each that is right; the others are to be read in another way.
+pub(super) type Numbers = ([f64; 8], u8);
 
 /// Eight bytes in a word.
 #[derive(Clone, Copy, Debug)]
@@ -146,6 +183,18 @@ impl Bytes for pulp::x86::V4 {
     #[inline(always)]
     fn sixteen(self, text: &[u8; 16], count: usize) -> u64 {
         (*self).sixteen(text, count)
+    }
+    #[inline(always)]
+    fn places(self, bits: u64, at: u32, places: &mut [u32; 80]) {
+        eights::places(self, bits, at, places);
+    }
+    #[inline(always)]
+    fn numbers(self, fields: &Eight, point: u8) -> Option<Numbers> {
+        Some(eights::numbers(self, fields, point))
+    }
+    #[inline(always)]
+    fn stamps(self, fields: &Eight, point: u8, origin: (i64, f64)) -> Option<Numbers> {
+        Some(eights::stamps(self, fields, point, origin))
     }
 }
 

@@ -5,11 +5,11 @@
 
 use super::super::Rows;
 use super::super::sniff::{self, Delimiter};
-use super::digits::{self, Bytes, LEAD, Words, eight, inexact, is_exact, joined, signed_ten};
+use super::digits::{self, Bytes, Eight, LEAD, Words, eight, inexact, is_exact, joined, signed_ten};
 use super::row::{Fault, Form, Slot, since, stamp};
 
 /// Lines are looked at in pieces that stay in the nearest cache.
-const PIECE: usize = 1 << 13;
+const PIECE: usize = 1 << 14;
 /// Room that a text needs behind its lines.
 pub(super) const ROOM: usize = 64;
 
@@ -18,19 +18,6 @@ pub(super) const ROOM: usize = 64;
 pub(super) struct Lines {
     /// Of all fields of a piece.
     ends: Vec<u32>,
-    column: Column,
-}
-
-/// The fields of one column: found one by one, divided many at a time.
-#[derive(Debug, Default)]
-struct Column {
-    /// Of stamps only.
-    whole: Vec<i64>,
-    part: Vec<i64>,
-    /// With the sign of the number.
-    divisor: Vec<f64>,
-    /// Those that are something else than digits with a point, and where.
-    others: Vec<(usize, f64)>,
 }
 
 /// Lines to be read: `text[LEAD..end]`, each with its end, and [`ROOM`] bytes behind them.
@@ -78,7 +65,7 @@ impl Lines {
                 None => None,
             };
             let read = match &fields {
-                Some(fields) if fields.numbers(simd, &mut self.column, rows) => fields.rows as u64,
+                Some(fields) if fields.numbers(simd, rows) => fields.rows as u64,
                 _ => 0,
             };
             if read > 0 {
@@ -111,29 +98,20 @@ impl Lines {
             Delimiter::Byte(byte) => [byte, byte],
             Delimiter::Spaces => [b' ', b'\t'],
         };
-        self.ends.resize(self.ends.len().max(end - from + 65), 0);
+        self.ends.resize(self.ends.len().max(end - from + 81), 0);
         self.ends[0] = from as u32 - 1;
         let (mut lines, mut count) = (0, 1);
         for (at, block) in (from..end).step_by(64).zip(text[from..].as_chunks::<64>().0) {
             let inside = if end - at < 64 { (1 << (end - at)) - 1 } else { !0 };
             let (ends, feeds, quotes) = simd.ends(block, separators);
-            let mut ends = ends & inside;
+            let ends = ends & inside;
             lines += (feeds & inside).count_ones() as usize;
             if quotes & inside != 0 {
                 return None;
             }
-            let places = self.ends[count..].first_chunk_mut::<64>()?;
+            let places = self.ends[count..].first_chunk_mut::<80>()?;
             count += ends.count_ones() as usize;
-            // four at a time: how many there are is less of a surprise
-            for four in places.as_chunks_mut::<4>().0 {
-                for place in four {
-                    *place = at as u32 + ends.trailing_zeros();
-                    ends &= ends.wrapping_sub(1);
-                }
-                if ends == 0 {
-                    break;
-                }
-            }
+            simd.places(ends, at as u32, places);
         }
         Some((lines, count))
     }
@@ -202,6 +180,44 @@ struct Decimal {
     count: usize,
 }
 
+impl Decimal {
+    #[inline(always)]
+    fn value(&self) -> f64 {
+        let m = joined(self.whole, self.fraction, self.count);
+        if is_exact(m) {
+            m as f64 / signed_ten(self.count, self.negative)
+        } else {
+            let value = inexact(m, self.count);
+            if self.negative { -value } else { value }
+        }
+    }
+    #[inline(always)]
+    fn since(&self, origin: (i64, f64)) -> f64 {
+        let whole = if self.negative { -(self.whole as i64) } else { self.whole as i64 };
+        since(origin, whole, self.fraction as f64 / signed_ten(self.count, self.negative))
+    }
+}
+
+/// What the fields of a column are.
+#[derive(Clone, Copy)]
+enum Kind {
+    /// `beside`: text is a missing value.
+    Number {
+        beside: bool,
+    },
+    Stamp {
+        origin: (i64, f64),
+    },
+}
+
+/// So many values more.
+#[inline(always)]
+fn extended(values: &mut Vec<f64>, more: usize) -> &mut [f64] {
+    let before = values.len();
+    values.resize(before + more, 0.0);
+    &mut values[before..]
+}
+
 impl<'a> Fields<'a> {
     /// `None` if the lines are not alike.
     #[inline(always)]
@@ -254,77 +270,96 @@ impl<'a> Fields<'a> {
 
     /// All wanted columns; false if some field shows that the line is not alike.
     #[inline(always)]
-    fn numbers(&self, simd: impl Bytes, column: &mut Column, rows: &mut Rows) -> bool {
-        let Column { whole: wholes, part: parts, divisor: divisors, others } = column;
-        wholes.resize(self.rows, 0);
-        parts.resize(self.rows, 0);
-        divisors.resize(self.rows, 1.0);
-        for (first, slot) in self.form.slots.iter().enumerate() {
-            others.clear();
-            let mut at = first;
-            match *slot {
-                Slot::Skip => {}
+    fn numbers(&self, simd: impl Bytes, rows: &mut Rows) -> bool {
+        for (column, slot) in self.form.slots.iter().enumerate() {
+            let read = match *slot {
+                Slot::Skip => true,
                 Slot::Axis(axis) | Slot::Beside(axis) => {
-                    for (row, (part, divisor)) in parts.iter_mut().zip(&mut *divisors).enumerate() {
-                        let (from, end) = self.place(at);
-                        at += self.count;
-                        if let Some(Decimal { negative, whole, fraction, count }) = self.decimal(simd, from, end) {
-                            let m = joined(whole, fraction, count);
-                            (*part, *divisor) = (m as i64, signed_ten(count, negative));
-                            if !is_exact(m) {
-                                let value = inexact(m, count);
-                                others.push((row, if negative { -value } else { value }));
-                            }
-                        } else if let Some(value) = self.other_number(from, end, slot) {
-                            others.push((row, value));
-                        } else {
-                            return false;
-                        }
-                    }
-                    let values = &mut rows.values[axis];
-                    let before = values.len();
-                    values.resize(before + self.rows, 0.0);
-                    let values = &mut values[before..];
-                    for ((value, part), divisor) in values.iter_mut().zip(&*parts).zip(&*divisors) {
-                        *value = *part as f64 / divisor;
-                    }
-                    for (row, value) in &*others {
-                        values[*row] = *value;
-                    }
+                    let values = extended(&mut rows.values[axis], self.rows);
+                    self.column(simd, column, Kind::Number { beside: matches!(slot, Slot::Beside(_)) }, values)
                 }
                 Slot::Time => {
                     // so that no difference from it overflows
                     let Some(origin) = self.form.origin.filter(|(whole, _)| whole.unsigned_abs() < 1 << 62) else {
                         return false;
                     };
-                    for (row, ((whole_part, part), divisor)) in
-                        wholes.iter_mut().zip(&mut *parts).zip(&mut *divisors).enumerate()
-                    {
-                        let (from, end) = self.place(at);
-                        at += self.count;
-                        if let Some(Decimal { negative, whole, fraction, count }) = self.decimal(simd, from, end) {
-                            *whole_part = if negative { -(whole as i64) } else { whole as i64 };
-                            (*part, *divisor) = (fraction as i64, signed_ten(count, negative));
-                        } else if let Some((whole, part)) = self.other_stamp(from, end) {
-                            others.push((row, since(origin, whole, part)));
-                        } else {
-                            return false;
-                        }
-                    }
-                    let before = rows.time.len();
-                    rows.time.resize(before + self.rows, 0.0);
-                    let times = &mut rows.time[before..];
-                    for (((time, whole), part), divisor) in times.iter_mut().zip(&*wholes).zip(&*parts).zip(&*divisors)
-                    {
-                        *time = (whole - origin.0) as f64 + (*part as f64 / divisor - origin.1);
-                    }
-                    for (row, time) in &*others {
-                        times[*row] = *time;
-                    }
+                    self.column(simd, column, Kind::Stamp { origin }, extended(&mut rows.time, self.rows))
                 }
+            };
+            if !read {
+                return false;
             }
         }
         true
+    }
+
+    #[inline(always)]
+    fn column(&self, simd: impl Bytes, column: usize, kind: Kind, values: &mut [f64]) -> bool {
+        let (eights, rest) = values.as_chunks_mut::<8>();
+        let mut at = column;
+        for eight in eights {
+            let good = match self.eight(at) {
+                Some(fields) => match kind {
+                    Kind::Number { .. } => simd.numbers(&fields, self.point),
+                    Kind::Stamp { origin } => simd.stamps(&fields, self.point, origin),
+                },
+                None => None,
+            };
+            let good = match good {
+                Some((numbers, good)) => {
+                    *eight = numbers;
+                    good
+                }
+                None => 0,
+            };
+            if good != !0 && !self.one_by_one(simd, at, kind, good, eight) {
+                return false;
+            }
+            at += 8 * self.count;
+        }
+        self.one_by_one(simd, at, kind, 0, rest)
+    }
+
+    /// Values of consecutive rows from this field on, but for those that are good.
+    #[inline(always)]
+    fn one_by_one(&self, simd: impl Bytes, mut at: usize, kind: Kind, good: u8, values: &mut [f64]) -> bool {
+        for (i, value) in values.iter_mut().enumerate() {
+            if good >> i & 1 == 0 {
+                let (from, end) = self.place(at);
+                let read = match kind {
+                    Kind::Number { beside } => match self.decimal(simd, from, end) {
+                        Some(decimal) => Some(decimal.value()),
+                        None => self.other_number(from, end, beside),
+                    },
+                    Kind::Stamp { origin } => match self.decimal(simd, from, end) {
+                        Some(decimal) => Some(decimal.since(origin)),
+                        None => self.other_stamp(from, end, origin),
+                    },
+                };
+                match read {
+                    Some(read) => *value = read,
+                    None => return false,
+                }
+            }
+            at += self.count;
+        }
+        true
+    }
+
+    /// The fields of eight rows.
+    #[inline(always)]
+    fn eight(&self, at: usize) -> Option<Eight> {
+        let mut eight = Eight { words: [[0; 8]; 3], lengths: [0; 8] };
+        for i in 0..8 {
+            let (from, end) = self.place(at + i * self.count);
+            let near: &[u8; 24] = self.text.get(end.wrapping_sub(24)..end)?.first_chunk()?;
+            let [third, second, first] = near.as_chunks::<8>().0 else { return None };
+            eight.words[0][i] = u64::from_le_bytes(*first);
+            eight.words[1][i] = u64::from_le_bytes(*second);
+            eight.words[2][i] = u64::from_le_bytes(*third);
+            eight.lengths[i] = (end - from) as u64;
+        }
+        Some(eight)
     }
 
     /// The field, if it is a sign or none, 1 to 8 digits, a decimal point, and 1 to 16 digits.
@@ -370,19 +405,18 @@ impl<'a> Fields<'a> {
     }
 
     #[inline(never)]
-    fn other_number(&self, from: usize, end: usize, slot: &Slot) -> Option<f64> {
+    fn other_number(&self, from: usize, end: usize, beside: bool) -> Option<f64> {
         let comma = self.form.decimal_comma;
         let field = self.trimmed(from, end)?;
-        match (digits::number(field, comma).or_else(|| sniff::number(field, comma)), slot) {
-            (None, Slot::Beside(_)) => Some(f64::NAN),
-            (value, _) => value,
-        }
+        let value = digits::number(field, comma).or_else(|| sniff::number(field, comma));
+        value.or(beside.then_some(f64::NAN))
     }
 
     #[inline(never)]
-    fn other_stamp(&self, from: usize, end: usize) -> Option<(i64, f64)> {
+    fn other_stamp(&self, from: usize, end: usize, origin: (i64, f64)) -> Option<f64> {
         let comma = self.form.decimal_comma;
         let field = self.trimmed(from, end)?;
-        digits::integer(field).map(|whole| (whole, 0.0)).or_else(|| stamp(field, comma))
+        let (whole, part) = digits::integer(field).map(|whole| (whole, 0.0)).or_else(|| stamp(field, comma))?;
+        Some(since(origin, whole, part))
     }
 }

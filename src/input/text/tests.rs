@@ -354,7 +354,9 @@ fn a_line_may_be_nearly_a_mebibyte_long() {
 fn many_bytes_at_once() {
     let mut dice = Dice::new(5);
     for _ in 0..2000 {
+        let dense = dice.up_to(20) == 0;
         let block: [u8; 64] = std::array::from_fn(|_| match dice.up_to(3) {
+            _ if dense => b'\n',
             0 => dice.up_to(255) as u8,
             1 => b"\n\"; \t"[dice.up_to(4)],
             _ => b'0' + dice.up_to(9) as u8,
@@ -367,11 +369,17 @@ fn many_bytes_at_once() {
         let digits = dice.digits(16);
         let text = <[u8; 16]>::try_from(digits.as_bytes()).unwrap();
         let numbers: Vec<u64> = (1..=16).map(|count| digits[16 - count..].parse().unwrap()).collect();
-        let expected = (ends(b' ', b'\t'), ends(b';', b';'), others, numbers);
-        type Found = ((u64, u64, u64), (u64, u64, u64), u32, Vec<u64>);
+        let semicolons = ends(b';', b';');
+        let places = (0..64).filter(|i| semicolons.0 >> i & 1 == 1).map(|i| i + 1000).collect();
+        let expected = (ends(b' ', b'\t'), semicolons, others, numbers, places);
+        type Found = ((u64, u64, u64), (u64, u64, u64), u32, Vec<u64>, Vec<u32>);
         fn all(simd: impl Bytes, block: &[u8; 64], start: &[u8; 32], text: &[u8; 16]) -> Found {
             let numbers = (1..=16).map(|count| simd.sixteen(text, count)).collect();
-            (simd.ends(block, [b' ', b'\t']), simd.ends(block, [b';', b';']), simd.others(start), numbers)
+            let semicolons = simd.ends(block, [b';', b';']);
+            let mut places = [0; 80];
+            simd.places(semicolons.0, 1000, &mut places);
+            let places = places[..semicolons.0.count_ones() as usize].to_vec();
+            (simd.ends(block, [b' ', b'\t']), semicolons, simd.others(start), numbers, places)
         }
         assert_eq!(all(Words, &block, start, &text), expected);
         #[cfg(target_arch = "x86_64")]

@@ -18,9 +18,9 @@ use pulp::{Arch, NullaryFnOnce};
 
 use super::robust::{Sample, median, median_and_spread, quantile, short};
 use super::stamps::Count;
-use super::windows::{Windows, extent, surely_quiet};
+use super::windows::{Extent, Windows, surely_quiet};
 use super::{InputKind, Note, Place, Places};
-use crate::numerics::reduce::{Moments, by_eight};
+use crate::numerics::reduce::Moments;
 use crate::units::{Quantity, Unit};
 
 const WINDOW: usize = 1000;
@@ -138,24 +138,22 @@ impl AxisCheck {
         while !values.is_empty() {
             // up to the end of the window in which outliers are sought
             let (part, rest) = values.split_at(values.len().min(WINDOW - self.window.len()));
-            // 0 x is NaN for what is not finite
-            if self.kind == InputKind::Angle || by_eight(part, |x| 0.0 * x) != 0.0 {
+            let extent = Extent::of(part);
+            if self.kind == InputKind::Angle || !extent.finite {
                 part.iter().enumerate().for_each(|(i, x)| self.add(*x, places.at(i)));
             } else {
-                self.add_finite(part, places);
+                self.add_finite(part, extent, places);
             }
             (values, places) = (rest, places.skip(part.len()));
         }
     }
 
     #[inline(always)]
-    fn add_finite(&mut self, part: &[f64], places: Places) {
-        let (smallest, largest) = extent(part);
+    fn add_finite(&mut self, part: &[f64], extent: Extent, places: Places) {
+        let Extent { smallest, largest, zeros, .. } = extent;
         self.usable += part.len() as u64;
         self.range = (self.range.0.min(smallest), self.range.1.max(largest));
-        if smallest <= 0.0 && largest >= 0.0 {
-            self.zeros += by_eight(part, |x| if x == 0.0 { 1.0 } else { 0.0 }) as u64;
-        }
+        self.zeros += zeros;
         let previous = self.previous.replace(part[part.len() - 1]);
         let alike = |pair: &[f64]| pair[0] == pair[1];
         if previous == Some(part[0]) || part.windows(2).fold(false, |any, pair| any | alike(pair)) {

@@ -1,49 +1,64 @@
 //! Medians from a bounded, reproducible sample of a stream.
 
-/// An even sample of a stream of any length: an element stays if a hash of its index is small enough, and the bound is
-/// halved whenever more than `capacity` have stayed. No clock and no random state: the same stream gives the same sample.
+/// Indices that share a hash.
+const GROUP: u64 = 64;
+
+/// An even sample of a stream of any length: an element stays if the rank of its index is high enough, and the bound rises by one whenever
+/// more than `capacity` have stayed. No clock and no random state: the same stream gives the same sample.
 #[derive(Clone, Debug)]
 pub(super) struct Sample {
-    kept: Vec<(u64, f64)>,
+    kept: Vec<(u32, f64)>,
+    /// The least rank that stays.
     level: u32,
     index: u64,
     capacity: usize,
+}
+
+/// Of every 64 indices 64/2^r have at least rank r: every 2^r-th of them from a random place on; one has rank 6, and it has rank 6 + k in
+/// one of 2^k groups.
+#[inline(always)]
+fn rank(index: u64) -> u32 {
+    let hash = mix(index / GROUP);
+    match ((index ^ hash) | GROUP).trailing_zeros() {
+        6 => 6 + hash.leading_zeros(),
+        below => below,
+    }
 }
 
 impl Sample {
     pub(super) fn new(capacity: usize) -> Self {
         Sample { kept: Vec::new(), level: 0, index: 0, capacity }
     }
-    #[inline(never)]
     pub(super) fn add(&mut self, x: f64) {
-        let hash = mix(self.index);
-        self.index += 1;
-        if hash.leading_zeros() < self.level {
+        self.add_all(&[x]);
+    }
+    /// The same as one by one.
+    pub(super) fn add_all(&mut self, x: &[f64]) {
+        let (first, end) = (self.index, self.index + x.len() as u64);
+        self.index = end;
+        for group in first / GROUP..end.div_ceil(GROUP) {
+            let hash = mix(group);
+            if 6 + hash.leading_zeros() < self.level {
+                continue;
+            }
+            let step = 1 << self.level.min(6);
+            let from = group * GROUP;
+            let places = (from + hash % step..from + GROUP).step_by(step as usize);
+            for index in places.filter(|index| (first..end).contains(index)) {
+                self.keep(rank(index), x[(index - first) as usize]);
+            }
+        }
+    }
+    #[inline(never)]
+    fn keep(&mut self, rank: u32, x: f64) {
+        if rank < self.level {
             return;
         }
-        self.kept.push((hash, x));
+        self.kept.push((rank, x));
         while self.kept.len() > self.capacity {
             self.level += 1;
             let level = self.level;
-            self.kept.retain(|(hash, _)| hash.leading_zeros() >= level);
-        }
-    }
-    /// The same one by one.
-    #[inline(always)]
-    pub(super) fn add_all(&mut self, mut x: &[f64]) {
-        /// Looked at together: of most of them nothing stays.
-        const GROUP: usize = 64;
-        while !x.is_empty() {
-            let (group, rest) = x.split_at(x.len().min(GROUP));
-            // hash.leading_zeros() >= level
-            let bound = u64::MAX >> self.level;
-            let first = self.index;
-            if group.len() < GROUP || (0..GROUP as u64).fold(false, |any, i| any | (mix(first + i) <= bound)) {
-                group.iter().for_each(|x| self.add(*x));
-            } else {
-                self.index += GROUP as u64;
-            }
-            x = rest;
+            self.kept.retain(|(rank, _)| *rank >= level);
         }
     }
     pub(super) fn values(&self) -> Vec<f64> {
@@ -129,6 +144,27 @@ mod tests {
         let mut b = Sample::new(1000);
         (0..100_000).for_each(|i| b.add(f64::from(i)));
         assert_eq!(values, b.values());
+        let mut rest = &(0..100_000).map(f64::from).collect::<Vec<_>>()[..];
+        let mut c = Sample::new(1000);
+        for size in (1..200).cycle() {
+            let (part, others) = rest.split_at(size.min(rest.len()));
+            c.add_all(part);
+            rest = others;
+            if rest.is_empty() {
+                break;
+            }
+        }
+        assert_eq!(values, c.values());
+        // whatever went before: those of high rank, of which one in 2^level has it
+        let kept: Vec<f64> = (0..100_000).filter(|i| rank(*i) >= a.level).map(|i| i as f64).collect();
+        assert!(a.level > 6 && values == kept, "{}", a.level);
+        for level in 0..=10 {
+            let count = (0..1 << 20).filter(|i| rank(*i) >= level).count() as f64;
+            // 2^14 groups: above level 6 a binomial number of them, within 6 standard deviations
+            let (expected, groups) = (2f64.powi(20 - level as i32), 2f64.powi(14));
+            let slack = if level <= 6 { 0.0 } else { 6.0 * groups.sqrt() * 2f64.powi(-(level as i32 - 6)).sqrt() };
+            assert!((count - expected).abs() <= slack, "{level}: {count}");
+        }
         let mut small = Sample::new(1000);
         (0..1000).for_each(|i| small.add(f64::from(i)));
         assert_eq!(small.values().len(), 1000);

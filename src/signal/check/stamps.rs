@@ -15,7 +15,7 @@ use pulp::{Arch, NullaryFnOnce};
 
 use super::line::Line;
 use super::robust::{Sample, quantile};
-use super::windows::extent;
+use super::windows::Extent;
 use super::{Place, Places};
 use crate::signal::Gap;
 
@@ -179,7 +179,7 @@ impl Stamps {
             self.rows += times.len() as u64;
             self.line.add(row, times);
             self.last = times[times.len() - 1];
-            self.longest = self.longest.max(extent(&steps).1);
+            self.longest = self.longest.max(Extent::of(&steps).largest);
             self.steps += steps.len() as u64;
             self.sample.add_all(&steps);
             if let Some((_, next)) = self.long.last_mut().filter(|_| self.next_wanted) {

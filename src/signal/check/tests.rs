@@ -74,6 +74,24 @@ fn rows_of_zeros_and_repeated_rows_are_counted() {
     assert_eq!((repeated.count, repeated.first_index, repeated.serious), (2500, 1, true));
 }
 
+/// However the rows come: here every part begins with the row that ended the one before.
+#[test]
+fn repeated_rows_are_counted_from_part_to_part() {
+    let (mut x, mut y) = (values(5000, 0.0), values(5000, 1.0));
+    for i in (10..5000).step_by(10) {
+        (x[i], y[i]) = (x[i - 1], y[i - 1]);
+    }
+    let unit = deg();
+    let mut checker =
+        Checker::new([("x", &unit), ("y", &unit)], Quantity::AngularRate, InputKind::Rate, Some(100.0), false, None);
+    for (x, y) in x.chunks(10).zip(y.chunks(10)) {
+        checker.push(&[Samples { times: &[], axes: vec![x, y] }]).unwrap();
+    }
+    let Outcome::Done { check, .. } = checker.finish() else { panic!("a rate was given") };
+    let repeated = check.findings.iter().find(|f| f.kind == "repeated-row").unwrap();
+    assert_eq!((repeated.count, repeated.first_index), (499, 10));
+}
+
 #[test]
 fn zeros_of_a_coarse_sensor_are_no_finding() {
     // two axes that are 0 in half of their samples, independently: a quarter of the rows is zero by chance.

@@ -60,22 +60,31 @@ impl Together {
         }
         for start in (0..rows).step_by(PART) {
             let end = rows.min(start + PART);
-            let zero = |column: &&&[f64]| column[start..end].iter().fold(false, |any, x| any | (*x == 0.0));
+            let (mut with_zeros, mut with_repeats) = (0, 0);
+            // no closures here: they would not be compiled for the instructions of the processor
+            for (column, before) in columns.iter().zip(&self.before) {
+                let part = &column[start..end];
+                let mut zeros = false;
+                for x in part {
+                    zeros |= *x == 0.0;
+                }
+                let mut repeats = part[0] == if start == 0 { *before } else { column[start - 1] };
+                for (x, next) in part.iter().zip(&part[1..]) {
+                    repeats |= x == next;
+                }
+                with_zeros += usize::from(zeros);
+                with_repeats += usize::from(repeats);
+            }
             // all axes but one must have such a value for a row to count
-            if columns.iter().filter(zero).count() + 1 >= columns.len() {
+            if with_zeros + 1 >= columns.len() {
                 self.zero.add(columns.len(), start..end, places, |axis, row| columns[axis][row] == 0.0);
             }
-            let before = &self.before;
-            let repeated = |axis: usize, row: usize| {
-                let x = columns[axis][row];
-                x.is_finite() && x == if row == 0 { before[axis] } else { columns[axis][row - 1] }
-            };
-            let any = |axis: &usize| {
-                let column = &columns[*axis][start.max(1) - 1..end];
-                column.windows(2).fold(start == 0 && repeated(*axis, 0), |any, pair| any | (pair[0] == pair[1]))
-            };
-            if (0..columns.len()).filter(any).count() + 1 >= columns.len() {
-                self.repeated.add(columns.len(), start..end, places, repeated);
+            if with_repeats + 1 >= columns.len() {
+                let before = &self.before;
+                self.repeated.add(columns.len(), start..end, places, |axis, row| {
+                    let x = columns[axis][row];
+                    x.is_finite() && x == if row == 0 { before[axis] } else { columns[axis][row - 1] }
+                });
             }
         }
         if rows > 0 {

@@ -76,30 +76,132 @@ impl Windows {
 #[inline(always)]
 pub(super) fn surely_quiet(x: &[f64], bound: f64) -> bool {
     let center = by_eight(x, |v| v) / x.len() as f64;
-    let (smallest, largest) = extent(x);
+    let Extent { smallest, largest, .. } = Extent::of(x);
     let furthest = (largest - center).max(center - smallest);
     let slack = furthest / 32.0;
     let (low, high) = (center - slack, center + slack);
     let near = (1.0 + 1e-6) * (furthest + slack) / bound + slack;
-    let half = 0.5 * x.len() as f64;
-    let count = |yes: bool| if yes { 1.0 } else { 0.0 };
-    by_eight(x, |v| count(v < low)) < half
-        && by_eight(x, |v| count(v > high)) < half
-        && by_eight(x, |v| count((v - center).abs() <= near)) < half
+    let bounds = Bounds { low, high, center, near };
+    let (chunks, rest) = x.as_chunks::<LANES>();
+    let mut counts = [[0; LANES]; 3];
+    for chunk in chunks {
+        bounds.count(chunk, &mut counts);
+    }
+    bounds.count(rest, &mut counts);
+    counts.iter().all(|count| 2 * count.iter().sum::<u64>() < x.len() as u64)
 }
 
-/// Smallest and largest of finite values.
-#[inline(always)]
-pub(super) fn extent(x: &[f64]) -> (f64, f64) {
-    let (chunks, rest) = x.as_chunks::<8>();
-    let (mut low, mut high) = ([f64::INFINITY; 8], [f64::NEG_INFINITY; 8]);
-    let mut take = |chunk: &[f64]| {
-        for ((low, high), v) in low.iter_mut().zip(&mut high).zip(chunk) {
-            *low = if *v < *low { *v } else { *low };
-            *high = if *v > *high { *v } else { *high };
+/// Values side by side, so that none waits for the one before.
+const LANES: usize = 16;
+
+struct Bounds {
+    low: f64,
+    high: f64,
+    center: f64,
+    near: f64,
+}
+
+impl Bounds {
+    /// Values below, above, and near the center.
+    #[inline(always)]
+    fn count(&self, values: &[f64], [below, above, close]: &mut [[u64; LANES]; 3]) {
+        for (i, v) in values.iter().enumerate() {
+            below[i] += u64::from(*v < self.low);
+            above[i] += u64::from(*v > self.high);
+            close[i] += u64::from((*v - self.center).abs() <= self.near);
         }
-    };
-    chunks.iter().for_each(|chunk| take(chunk));
-    take(rest);
-    (low.into_iter().fold(f64::INFINITY, f64::min), high.into_iter().fold(f64::NEG_INFINITY, f64::max))
+    }
+}
+
+/// What one look at many values says.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Extent {
+    /// Of the finite values, if all are.
+    pub(super) smallest: f64,
+    pub(super) largest: f64,
+    pub(super) finite: bool,
+    pub(super) zeros: u64,
+}
+
+/// The look in the making.
+struct Looks {
+    low: [f64; LANES],
+    high: [f64; LANES],
+    /// NaN after what is not finite.
+    nothing: [f64; LANES],
+    zeros: [u64; LANES],
+}
+
+impl Looks {
+    #[inline(always)]
+    fn add(&mut self, values: &[f64]) {
+        for (i, v) in values.iter().enumerate() {
+            self.low[i] = if *v < self.low[i] { *v } else { self.low[i] };
+            self.high[i] = if *v > self.high[i] { *v } else { self.high[i] };
+            self.nothing[i] += 0.0 * *v;
+            self.zeros[i] += u64::from(*v == 0.0);
+        }
+    }
+}
+
+impl Extent {
+    #[inline(always)]
+    pub(super) fn of(x: &[f64]) -> Extent {
+        let (low, high) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
+        let mut looks = Looks { low, high, nothing: [0.0; LANES], zeros: [0; LANES] };
+        let (chunks, rest) = x.as_chunks::<LANES>();
+        for chunk in chunks {
+            looks.add(chunk);
+        }
+        looks.add(rest);
+        Extent {
+            smallest: looks.low.into_iter().fold(f64::INFINITY, f64::min),
+            largest: looks.high.into_iter().fold(f64::NEG_INFINITY, f64::max),
+            finite: looks.nothing.iter().sum::<f64>() == 0.0,
+            zeros: looks.zeros.iter().sum(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_value_counts_whatever_the_length() {
+        for length in 1..70 {
+            for at in 0..length {
+                let with = |value: f64| {
+                    let mut x: Vec<f64> = (0..length).map(|i| 1.0 + f64::from(i)).collect();
+                    x[at as usize] = value;
+                    Extent::of(&x)
+                };
+                assert_eq!((with(-3.0).smallest, with(99.0).largest), (-3.0, 99.0));
+                assert_eq!((with(0.0).zeros, with(1.5).zeros), (1, 0));
+                assert!(with(0.0).finite && !with(f64::NAN).finite && !with(f64::NEG_INFINITY).finite);
+            }
+        }
+    }
+
+    /// Never quiet where a value is further than the bound, by the definition; mostly quiet where none is far.
+    #[test]
+    fn what_is_called_quiet_is_quiet() {
+        let bound = 4.0;
+        let mut quiet = 0;
+        for case in 0..2000_u64 {
+            let length = 3 + (case * 7 % 60) as usize;
+            // a line of values in any order, some of them moved away
+            let mut x: Vec<f64> = (0..length).map(|i| ((i as u64 * 37 + case) % 61) as f64).collect();
+            if case % 3 > 0 {
+                x[(case % length as u64) as usize] = 30.0 + (case % 400) as f64;
+            }
+            let mut scratch = x.clone();
+            let (center, spread) = super::super::robust::median_and_spread(&mut scratch);
+            let far = x.iter().any(|v| (v - center).abs() > bound * spread / 1.4826);
+            let says = surely_quiet(&x, bound);
+            assert!(!(says && far), "{x:?}");
+            quiet += usize::from(says);
+        }
+        assert!(quiet > 400, "{quiet}");
+    }
 }

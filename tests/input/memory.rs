@@ -14,7 +14,7 @@ use super::messages::SAMPLES;
 const ROOM: u64 = 16 << 10;
 
 /// `info` goes through every table, `allan` keeps the samples of one. Data of the process, stacks included, are limited by `ulimit -d`.
-fn stays_inside(bench: &Bench, name: &str, bytes: &[u8], flags: &[&str]) {
+fn stays_inside(bench: &Bench, name: &str, bytes: &[u8], flags: &[&str], intact: bool) {
     let path = bench.file(name, bytes);
     let limit = 4 * (bytes.len() as u64).div_ceil(1024) + ROOM;
     for command in ["info", "allan"] {
@@ -42,11 +42,9 @@ fn stays_inside(bench: &Bench, name: &str, bytes: &[u8], flags: &[&str]) {
             }
             std::thread::sleep(Duration::from_millis(1));
         };
-        assert!(
-            matches!(status, Some(0..=2)),
-            "{command} of {name}, {} bytes, with {limit} KiB: {status:?}",
-            bytes.len()
-        );
+        // where the limit could not be set, the shell ends with 2
+        let fine = if intact && command == "info" { status == Some(0) } else { matches!(status, Some(0..=2)) };
+        assert!(fine, "{command} of {name}, {} bytes, with {limit} KiB: {status:?}", bytes.len());
     }
 }
 
@@ -67,9 +65,9 @@ fn a_file_takes_four_times_its_size_and_some_room_at_most() {
         let path = if path.is_dir() { path.join("mav0/imu0/data.csv") } else { path.clone() };
         let bytes = std::fs::read(&path).unwrap();
         let (bench, name) = (Bench::new(), path.file_name().unwrap().to_str().unwrap());
-        stays_inside(&bench, name, &bytes, flags);
+        stays_inside(&bench, name, &bytes, flags, true);
         cuts(&bytes).step_by(17).chain(changed(&bytes, 12)).for_each(|damaged| {
-            stays_inside(&bench, name, &damaged, flags);
+            stays_inside(&bench, name, &damaged, flags, false);
         });
     });
 }

@@ -5,6 +5,7 @@
 
 mod guard;
 mod pages;
+mod thrift;
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -78,6 +79,9 @@ impl ParquetTable {
             Err(error) => return fail(format!("cannot read: {error}")),
         };
         let contents = "truncated or damaged: its table of contents cannot be read";
+        if thrift::contents_end(&file).is_err() {
+            return fail(format!("{contents} (a list declares more than there is)"));
+        }
         let metadata = match guarded(|| ParquetMetaDataReader::new().parse_and_finish(&file)) {
             Some(Ok(metadata)) => metadata,
             Some(Err(error)) => return fail(format!("{contents} ({})", plain(&error))),

@@ -11,6 +11,7 @@ use parquet::file::metadata::ColumnChunkMetaData;
 use parquet::file::reader::{ChunkReader, Length};
 use parquet::file::serialized_reader::SerializedPageReader;
 
+use super::thrift;
 use crate::input::bytes::zstd;
 
 /// The file of the pages. Reading on at its end is an error here: the crate passes over the elements of a damaged header one by one, as many as
@@ -67,11 +68,12 @@ impl Pages {
         let starts = [column.dictionary_page_offset(), Some(column.data_page_offset())];
         let start = starts.into_iter().flatten().min().unwrap_or(-1);
         let end = start.checked_add(column.compressed_size()).and_then(|end| u64::try_from(end).ok());
-        if starts.iter().flatten().any(|start| *start < 4)
-            || column.compressed_size() < 0
-            || end.is_none_or(|end| end > file.len())
-        {
+        let end = end.filter(|end| *end <= file.len() && column.compressed_size() >= 0);
+        let (Some(end), false) = (end, starts.iter().flatten().any(|start| *start < 4)) else {
             return Err(fault("a column lies outside the file"));
+        };
+        if thrift::headers_end(&file.0, start as u64, end).is_err() {
+            return Err(fault("the header of a page declares more than there is"));
         }
         let compression = column.compression();
         let left = usize::try_from(column.uncompressed_size()).map_err(|_| fault("a column of negative size"))?;

@@ -122,6 +122,14 @@ fn a_header_that_declares_more_than_the_file_has_ends() {
     damaged[4..11].copy_from_slice(&[0xf9, 0xf7, 0xff, 0xff, 0xff, 0xff, 0x07]);
     let message = read_bytes("log.parquet", &damaged, &[("rate", "100")]).unwrap_err();
     assert!(message.starts_with("log.parquet: row group 1: column 'gyro_x (deg/s)': "), "{message}");
+    // truth values, which take no bytes in its lists: in the header of a page, and in the table of contents
+    damaged[5] = 0xf2;
+    let message = read_bytes("log.parquet", &damaged, &[("rate", "100")]).unwrap_err();
+    assert!(message.ends_with("the header of a page declares more than there is"), "{message}");
+    let contents = [0x19, 0xf2, 0xff, 0xff, 0xff, 0xff, 0x07, 0];
+    let damaged = [b"PAR1", &contents[..], &8u32.to_le_bytes(), b"PAR1"].concat();
+    let message = read_bytes("log.parquet", &damaged, &[("rate", "100")]).unwrap_err();
+    assert!(message.ends_with("cannot be read (a list declares more than there is)"), "{message}");
 }
 
 #[test]

@@ -8,8 +8,8 @@ use crate::input::bytes::{Bytes, Short};
 
 /// As deep as the crate goes.
 const DEEPEST: u8 = 64;
-/// Bytes in which the header of a page is sought; one that is longer is left to the crate.
-const LONGEST_HEADER: u64 = 1 << 16;
+/// Bytes in which the header of a page is sought, few at first: pages may be many and small. One that is longer is left to the crate.
+const HEADER: [u64; 2] = [1 << 9, 1 << 16];
 
 /// More elements without bytes than bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,15 +43,15 @@ struct Walk<'a> {
 
 impl Walk<'_> {
     fn varint(&mut self) -> Result<u64, Fault> {
-        let mut number = 0;
-        for shift in (0..).step_by(7) {
+        let (mut number, mut shift) = (0, 0);
+        loop {
             let byte = self.left.u8()?;
             number |= u64::from(byte & 0x7f).checked_shl(shift).unwrap_or(0);
+            shift = (shift + 7).min(u64::BITS);
             if byte & 0x80 == 0 {
-                break;
+                return Ok(number);
             }
         }
-        Ok(number)
     }
 
     fn integer(&mut self) -> Result<i64, Fault> {
@@ -61,14 +61,14 @@ impl Walk<'_> {
 
     /// The fields up to the end of the record; the third, as in [`Passed`].
     fn record(&mut self, depth: u8) -> Result<Option<i64>, Fault> {
-        let (mut id, mut third) = (0, None);
+        let (mut id, mut third) = (0_i64, None);
         loop {
             let head = self.left.u8()?;
             let kind = head & 0xf;
             if kind == 0 {
                 return Ok(third);
             }
-            id = if head >> 4 > 0 { id + i64::from(head >> 4) } else { self.integer()? };
+            id = if head >> 4 > 0 { id.wrapping_add(i64::from(head >> 4)) } else { self.integer()? };
             if (id, kind) == (3, 5) {
                 third = Some(self.integer()?);
             } else {
@@ -152,8 +152,15 @@ pub(super) fn contents_end(file: &File) -> Result<(), Endless> {
 /// The headers of the pages between these places.
 pub(super) fn headers_end(file: &File, mut at: u64, end: u64) -> Result<(), Endless> {
     while at < end {
-        let Some(bytes) = read(file, at, LONGEST_HEADER.min(end - at)) else { break };
-        let Some(Passed { bytes, third: Some(page) }) = pass(&bytes)? else { break };
+        let mut header = None;
+        for most in HEADER {
+            let Some(bytes) = read(file, at, most.min(end - at)) else { return Ok(()) };
+            header = pass(&bytes)?;
+            if header.is_some() {
+                break;
+            }
+        }
+        let Some(Passed { bytes, third: Some(page) }) = header else { break };
         let Ok(page) = u64::try_from(page) else { break };
         at = at.saturating_add(bytes).saturating_add(page);
     }
@@ -189,6 +196,10 @@ mod tests {
         assert_eq!(pass(&[&[0x1b], &many[..], &[0x21, 0]].concat()), Err(Endless));
         assert_eq!(pass(&[0x19, 0x42, 0]), Err(Endless));
         assert_eq!(pass(&[0x19, 0x32, 0]), Ok(Some(Passed { bytes: 3, third: None })));
+        // a number of a field as large as there is, and a number of many bytes
+        let largest = [&[0x05, 0xfe], &[0xff; 8][..], &[0x01, 0, 0x15, 0, 0]].concat();
+        assert!(matches!(pass(&largest), Ok(Some(_))));
+        assert!(matches!(pass(&[&[0x15], &[0x80; 100][..], &[0, 0]].concat()), Ok(Some(Passed { bytes: 103, .. }))));
         // records in records
         assert_eq!(pass(&[0x1c; 1000]), Ok(None));
     }

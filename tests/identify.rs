@@ -75,6 +75,11 @@ fn study_runs() -> u64 {
     std::env::var("KFDESIGN_STUDY_RUNS").ok().and_then(|v| v.parse().ok()).unwrap_or(400)
 }
 
+/// Seed of a study: other logs of the same kind.
+fn study_seed(usual: u64) -> u64 {
+    std::env::var("KFDESIGN_STUDY_SEED").ok().and_then(|v| v.parse().ok()).unwrap_or(usual)
+}
+
 /// Bias, efficiency and coverage of three methods on the same logs of the reference sensor at 1 Hz, model given.
 ///
 /// A log in which a drift parameter is not identified is counted and left out.
@@ -83,13 +88,14 @@ fn study_runs() -> u64 {
 fn identify_study_of_methods() {
     let runs = study_runs();
     let forced = parse_model("white+gm").unwrap();
-    for hours in [1.0_f64, 2.0, 4.0, 10.0] {
+    let only = std::env::var("KFDESIGN_STUDY_CASE").unwrap_or_default();
+    for hours in [1.0_f64, 2.0, 4.0, 10.0].into_iter().filter(|h| format!("{h} h").contains(&only)) {
         let samples = (hours * 3600.0) as usize;
         let bound = likelihood::bound(N, SIGMA, TC, samples, 1.0);
         for method in [Method::Likelihood, Method::Allan, Method::Gmwm] {
             let started = Instant::now();
             let one = |run: u64| {
-                let rate = log(&[white(N), gauss_markov(SIGMA, TC)], samples, 1.0, 35, run);
+                let rate = log(&[white(N), gauss_markov(SIGMA, TC)], samples, 1.0, study_seed(35), run);
                 let found = identify_axis("x", &rate, 1.0, &Unit::parse("rad/s").unwrap(), method, &forced).unwrap();
                 let q_c = |[n, sigma, tc]: [f64; 3]| [n, sigma, tc, sigma + 0.5 * (2.0_f64.ln() - tc)];
                 let (truth, estimate) = (q_c([N, SIGMA, TC].map(f64::ln)), q_c(logs(&found.model)));
@@ -107,9 +113,12 @@ fn identify_study_of_methods() {
             for (i, name) in ["N", "sigma", "Tc", "q_c"].iter().enumerate() {
                 let mean = found.iter().map(|(e, _)| e[i]).sum::<f64>() / n;
                 let sd = (found.iter().map(|(e, _)| (e[i] - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
-                let covered = found.iter().filter(|(_, c)| c.get(i) == Some(&true)).count() as f64 / n;
+                let covered = |(_, c): &&([f64; 4], [bool; 3])| c.get(i) == Some(&true);
+                // q_c has no interval
+                let covered = (i < 3).then(|| found.iter().filter(covered).count() as f64 / n);
+                let covered = covered.map_or("".into(), |share| format!("  coverage {share:.3}"));
                 println!(
-                    "  {name:6} mean error/sd {:+.2}  sd {sd:.4}  efficiency {:.2}  coverage {covered:.3}",
+                    "  {name:6} mean error/sd {:+.2}  sd {sd:.4}  efficiency {:.2}{covered}",
                     mean / sd,
                     (bound[i] / sd).powi(2)
                 );

@@ -210,3 +210,122 @@ fn table_of_measured_logs() {
         }
     }
 }
+
+const SUNSIDED: &str = "static/sunsided_sensor-fusion/";
+
+/// Every resting log of the folder: label, file, flags, length in s that is used.
+const RESTING: [(&str, &str, &str, f64); 16] = [
+    ("ADIS16405 gyro", "adis", "--rate 100 --sensor gyro", 10_000.0),
+    ("ADIS16405 accelerometer", "adis", "--rate 100 --sensor accel", 10_000.0),
+    ("MPU6050 gyro, 10 min", "derived/set-2_unmoved-with-x-pointing-forward-10min.csv.gz", "--sensor gyro", 655.1),
+    (
+        "MPU6050 accelerometer, 10 min",
+        "derived/set-2_unmoved-with-x-pointing-forward-10min.csv.gz",
+        "--sensor accel",
+        655.1,
+    ),
+    ("MPU6050 gyro, 2 min", "derived/set-2_unmoved-with-x-pointing-forward.csv.gz", "--sensor gyro", 123.2),
+    ("MPU6050 accelerometer, 2 min", "derived/set-2_unmoved-with-x-pointing-forward.csv.gz", "--sensor accel", 123.2),
+    (
+        "MPU6050 gyro, 102 s",
+        "set-2_unmoved-with-z-pointing-front-and-y-down/mpu6050_gyroscope.mat",
+        "--columns 2,3,4 --rate 99.4 --unit deg/s",
+        102.4,
+    ),
+    (
+        "MPU6050 accelerometer, 102 s",
+        "set-2_unmoved-with-z-pointing-front-and-y-down/mpu6050_accelerometer.mat",
+        "--columns 2,3,4 --rate 99.4 --unit g",
+        102.4,
+    ),
+    (
+        "MPU6050 gyro, 64 s",
+        "set-1_unmoved-x-pointing-forward/mpu6050_gyroscope.mat",
+        "--columns 2,3,4 --rate 100.3 --unit deg/s",
+        63.6,
+    ),
+    (
+        "MPU6050 accelerometer, 64 s",
+        "set-1_unmoved-x-pointing-forward/mpu6050_accelerometer.mat",
+        "--columns 2,3,4 --rate 100.3 --unit g",
+        63.6,
+    ),
+    ("MPU6050 gyro, 63 s", "derived/set-1_unmoved-z-pointing-left.csv.gz", "--sensor gyro --rate 100.3", 62.6),
+    (
+        "MPU6050 accelerometer, 63 s",
+        "derived/set-1_unmoved-z-pointing-left.csv.gz",
+        "--sensor accel --rate 100.3",
+        62.6,
+    ),
+    ("MPU-6050 raw gyro, 449 s", "raw", "--rate 100 --columns gx,gy,gz --unit|1/131 deg/s", 449.3),
+    ("MPU-6050 raw accelerometer, 449 s", "raw", "--rate 100 --columns ax,ay,az --unit|1/16384 g", 449.3),
+    ("VN-310 gyro, 34 s", "vn", "--rate 20 --columns 17,18,19", 34.5),
+    ("VN-310 accelerometer, 34 s", "vn", "--rate 20 --columns 14,15,16", 34.5),
+];
+
+/// Parameters from one half of each log, innovations of the other: `cargo test --release -- --ignored --nocapture table_of_halves` prints the table of
+/// docs/validation.md. Outliers are left out where the command says that there are some.
+#[test]
+#[ignore = "prints a table for docs/validation.md"]
+fn table_of_halves() {
+    println!("| log | axis | n | model | first half on second: max \\|r\\| (lag), NIS | its own parameters | said |");
+    println!("| --- | --- | --- | --- | --- | --- | --- |");
+    for (label, file, flags, span_s) in RESTING {
+        let relative = match file {
+            "adis" => LOGS[0].path.to_string(),
+            "raw" => LOGS[7].path.to_string(),
+            "vn" => "static/UniStuttgart-INS_INSTINCT/vn310-imu.csv".into(),
+            file => format!("{SUNSIDED}{file}"),
+        };
+        let Some(path) = measured(&relative) else { return };
+        let path = path.display().to_string();
+        // Log wants constants
+        let log = Log { label: "", path: "", flags, white: [0.0; 3] };
+        let bench = Bench::new();
+        let [half, end] = [0.5 * span_s, span_s].map(|t| t.to_string());
+        let second = ["--start", half.as_str(), "--end", end.as_str()];
+        let json = |outcome: &Outcome| serde_json::from_str::<Value>(&outcome.stdout).unwrap();
+        let chain = |part: &[&str]| {
+            let identify = |more: &[&str]| {
+                let all = [part, &["-o", "params.json", "--json"], more].concat();
+                json(&run(&bench, "identify", &[&path], &log, &all))
+            };
+            let mut found = identify(&[]);
+            let outliers = |axis: &Value| axis["warnings"].to_string().contains("--robust leaves them out");
+            if found["axes"].as_array().unwrap().iter().any(outliers) {
+                found = identify(&["--robust"]);
+            }
+            let tune = bench.run("tune params.json -o filter.json");
+            assert!(tune.status < 2, "{label}: {}", tune.stderr);
+            (found, json(&run(&bench, "replay", &["filter.json", &path], &log, &[&second[..], &["--json"]].concat())))
+        };
+        let (found, replayed) = chain(&["--end", &half]);
+        let (_, own) = chain(&second);
+        for i in 0..3 {
+            let result = |document: &Value| {
+                let axis = &document["axes"][i];
+                let [r, nis] =
+                    [&axis["whiteness"]["max_abs_autocorrelation"], &axis["nis"]["mean"]].map(|v| v.as_f64());
+                format!("{:.4} ({}), {:.3}", r.unwrap_or(f64::NAN), axis["whiteness"]["lag"], nis.unwrap_or(f64::NAN))
+            };
+            let axis = &found["axes"][i];
+            let model = axis["candidates"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .find(|c| c["chosen"] == true)
+                .map_or("", |c| c["model"].as_str().unwrap_or(""));
+            let words = axis["warnings"].to_string();
+            let said = ["noise changes", "outliers", "level moves", "not at rest"]
+                .map(|w| if words.contains(w) { w } else { "" });
+            println!(
+                "| {label} | {} | {} | {model} | {} | {} | {} |",
+                ["x", "y", "z"][i],
+                replayed["axes"][i]["samples"],
+                result(&replayed),
+                result(&own),
+                said.iter().filter(|w| !w.is_empty()).copied().collect::<Vec<_>>().join(", ")
+            );
+        }
+    }
+}

@@ -11,6 +11,7 @@ mod shape;
 mod weighted_fit;
 
 pub use likelihood::maximum::maximum;
+pub use likelihood::recent::{Recent, recent};
 pub use likelihood::{Fitted, plan, temperature, windows};
 use schemars::JsonSchema;
 use serde::Serialize;

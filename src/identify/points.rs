@@ -75,9 +75,13 @@ pub(super) struct Covariance {
 }
 
 impl Points {
-    /// Points at averaging times up to a third of the log (three averages and more).
+    /// Points at averaging times up to half of the log, of wavelet variances up to a third.
     pub(super) fn of_curve(curve: &AllanCurve, distance: Distance) -> Points {
-        let used = curve.points.iter().filter(|p| p.m as usize <= curve.samples / 3 && p.deviation > 0.0);
+        let parts = match distance {
+            Distance::CubeRoots => 2,
+            Distance::Variances => 3,
+        };
+        let used = curve.points.iter().filter(|p| p.m as usize <= curve.samples / parts && p.deviation > 0.0);
         let (factors, variances) = used.map(|p| (p.m, p.deviation * p.deviation)).unzip();
         let geometry = Geometry::shared(factors, curve.samples, curve.dt);
         Points { table: Arc::new(Table { variances, windows: curve.windows as f64, distance, geometry }), skip: 0 }

@@ -2,6 +2,7 @@
 
 mod exact;
 mod gaps;
+mod recent;
 mod shared;
 mod study;
 

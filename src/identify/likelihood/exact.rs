@@ -11,8 +11,9 @@ use crate::model::{InitialBias, LinearModel, sensor_errors};
 use crate::noise::{Kind, NoiseModel};
 use crate::units::Quantity;
 
-/// Numbers that one likelihood may cost: samples × (states² + 4 states); above, the cosine coefficients have the last word.
-const MOST_WORK: f64 = 1e8;
+/// Numbers that a step of the search may cost: samples × (states² + 4 states) × (1 + 2 parameters), some seconds in all; above, the cosine
+/// coefficients have the last word.
+const MOST_WORK: f64 = 5e8;
 /// Steps of the search at most, from far away most of them; it ends when another would gain less than half of this in ln L: 3e-5 standard deviations from the maximum.
 const STEPS: usize = 40;
 const ENOUGH: f64 = 1e-9;
@@ -64,7 +65,8 @@ impl<'a> Exact<'a> {
     ) -> Option<Exact<'a>> {
         let exact = Exact { data, form, logs };
         let states = exact.model(start)?.states.len() as f64;
-        (exact.samples() as f64 * (states * states + 4.0 * states) < MOST_WORK).then_some(exact)
+        let points = 1.0 + 2.0 * start.len() as f64;
+        (exact.samples() as f64 * (states * states + 4.0 * states) * points < MOST_WORK).then_some(exact)
     }
 
     fn samples(&self) -> usize {

@@ -1,7 +1,8 @@
 //! Maximum likelihood on the cosine coefficients of the log: terms chosen, intervals given, the Cramér-Rao bound beside them.
 //!
 //! `ordinates` is the log in bins, `form` what a model consists of, `whittle` the likelihood and its maximum, `growth` the choice of the
-//! terms, `interval` what is known of each parameter, `sums` of several together, `plan` how long a log must be for that, `temperature` what of it follows the temperature.
+//! terms, `interval` what is known of each parameter, `sums` of several together, `plan` how long a log must be for that, `recent` whether all of it should be taken,
+//! `temperature` what of it follows the temperature.
 
 mod exact;
 mod form;
@@ -11,6 +12,7 @@ pub(super) mod maximum;
 mod names;
 mod ordinates;
 pub mod plan;
+pub(super) mod recent;
 pub(super) mod shared;
 pub(super) mod sums;
 pub mod temperature;

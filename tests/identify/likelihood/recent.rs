@@ -1,0 +1,101 @@
+//! Noise that changes along the log: what is told, what is taken, and that noise which stays the same is left alone.
+
+use kfdesign::identify::{Recent, parse_model, recent};
+use kfdesign::noise::Term;
+
+use super::{N, SIGMA, TC, gauss_markov, identify, log, white};
+use crate::support::Bench;
+
+fn told(rate: &[f64], dt: f64, model: &str) -> Option<Recent> {
+    let found = identify(rate, dt, &parse_model(model).unwrap());
+    recent(rate, dt, &found.fitted.unwrap())
+}
+
+/// Two parts of white noise, one after the other.
+fn two_levels(levels: [f64; 2], samples: [usize; 2], run: u64) -> Vec<f64> {
+    let part = |i: usize| log(&[white(levels[i])], samples[i], 1.0, 61, 2 * run + i as u64);
+    [part(0), part(1)].concat()
+}
+
+/// Thirty logs of each kind: a log has less than one chance in 10⁶. The gain of a part is at most ½ χ²_p (1 + ½), p ≤ 5, for a part as long as
+/// everything before; it must be above 10 + p.
+#[test]
+fn noise_that_stays_the_same_is_taken_whole() {
+    let line = Term::Oscillation { std_dev: 0.05, frequency_hz: 0.2, correlation_time: 100.0 };
+    let kinds: [(&str, Vec<Term>); 4] = [
+        ("white", vec![white(N)]),
+        ("white+gm", vec![white(N), gauss_markov(SIGMA, TC)]),
+        ("white+rrw", vec![white(N), Term::RateRandomWalk { density: SIGMA * (2.0 / TC).sqrt() }]),
+        ("white+osc", vec![white(N), line]),
+    ];
+    for (model, terms) in kinds {
+        for run in 0..30 {
+            let rate = log(&terms, 7200, 1.0, 62, run);
+            assert_eq!(told(&rate, 1.0, model), None, "{model}, run {run}");
+        }
+    }
+}
+
+/// White noise alone: −2 ln L = (n − 1) ln v + Σ (x − mean)²/v, so that the gain is known in closed form. The noise changes at 0.5 of the log, which
+/// is 0.75 of its first two thirds: only parts of at most 2/8 are of the later noise alone.
+#[test]
+fn gain_is_that_of_the_closed_form() {
+    let rate = two_levels([0.06, 0.05], [6000, 6000], 0);
+    let found = told(&rate, 1.0, "white").unwrap();
+    assert_eq!((found.start, found.part, found.before), (9000, 2000, 8000));
+    let sum = |x: &[f64]| {
+        let mean = x.iter().sum::<f64>() / x.len() as f64;
+        x.iter().map(|v| (v - mean).powi(2)).sum::<f64>()
+    };
+    let variance = |x: &[f64]| sum(x) / (x.len() as f64 - 1.0);
+    let late = &rate[8000..];
+    let minus_two_ln = |v: f64| 3999.0 * v.ln() + sum(late) / v;
+    let expected = 0.5 * (minus_two_ln(variance(&rate[..8000])) - minus_two_ln(variance(&rate[6000..8000])));
+    assert!((found.gain / expected - 1.0).abs() < 1e-6, "{} {expected}", found.gain);
+}
+
+/// A change that is too small to matter, or too late to be told, changes nothing: 2 % of the density in 6000 samples gain less than one in ln L, and what
+/// happens in the last third alone was told by no part before.
+#[test]
+fn small_or_late_changes_are_left_alone() {
+    assert_eq!(told(&two_levels([0.051, 0.05], [6000, 6000], 1), 1.0, "white"), None);
+    assert_eq!(told(&two_levels([0.06, 0.05], [9000, 3000], 2), 1.0, "white"), None);
+}
+
+/// The command takes the end of the log, says so, and takes all of it when told to. A line that moves from 12 to 10 Hz is where it is in the end.
+#[test]
+fn the_command_takes_the_end_of_a_changing_log() {
+    let line = |frequency_hz: f64| Term::Oscillation { std_dev: 0.1, frequency_hz, correlation_time: 5.0 };
+    let part = |frequency_hz: f64, run: u64| log(&[white(0.01), line(frequency_hz)], 20_000, 0.01, 63, run);
+    let rate = [part(12.0, 0), part(10.0, 1)].concat();
+    let bench = Bench::new();
+    let text: String =
+        std::iter::once("gyro_x (rad/s)\n".to_string()).chain(rate.iter().map(|v| format!("{v}\n"))).collect();
+    std::fs::write(bench.path("log.csv"), text).unwrap();
+    let identified = |more: &str| {
+        let outcome = bench.run(&format!("identify log.csv --rate 100 --json{more}"));
+        assert_eq!(outcome.status, 0, "{}", outcome.stderr);
+        serde_json::from_str::<serde_json::Value>(&outcome.stdout).unwrap()
+    };
+    let said = |document: &serde_json::Value| {
+        document["axes"][0]["warnings"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|w| w.as_str().unwrap().contains("noise changes"))
+    };
+    let frequencies = |document: &serde_json::Value| -> Vec<f64> {
+        let lines = document["params"]["axes"][0]["oscillation"].as_array().unwrap();
+        lines.iter().map(|line| line["frequency"]["value"].as_f64().unwrap()).collect()
+    };
+    let end = identified("");
+    assert!(said(&end), "{}", end["axes"][0]["warnings"]);
+    // the last quarter: 10,000 of 40,000 samples
+    assert_eq!(end["axes"][0]["samples"], 10_000);
+    // the frequency of a line of width 1/(π 5 s) in 100 s is known to 0.01 Hz or so
+    let found = frequencies(&end);
+    assert!(found.len() == 1 && (found[0] - 10.0).abs() < 0.05, "{found:?}");
+    let all = identified(" --whole-log");
+    assert!(!said(&all) && all["axes"][0]["samples"] == 40_000);
+    assert!(frequencies(&all).iter().any(|f| (f - 12.0).abs() < 0.1), "{:?}", frequencies(&all));
+}

@@ -59,9 +59,6 @@ pub struct Args {
     /// Leave outliers out: samples farther from their surroundings than noise goes
     #[arg(long)]
     robust: bool,
-    /// Take all of the log, also where its noise changes and the end of it tells what follows better
-    #[arg(long)]
-    whole_log: bool,
     /// Temperature column, beside whose regression the parameters are shown: name or 1-based number, with the unit if the header does not say it
     /// (temp:degC); `none` reads none [default: found by name]. The parameters written are those without
     #[arg(long, value_name = "COLUMN")]
@@ -361,24 +358,15 @@ fn identify(
     let longest = (0..parts.len()).rev().max_by_key(|i| parts[*i].rate.len()).unwrap_or(0);
     let upsets = upset_words(&parts[longest], dt, args.robust);
     let dropped: usize = if args.robust { parts.iter_mut().map(Stretch::drop_outliers).sum() } else { 0 };
-    let method = args.method.method();
-    let by_method = |parts: &[Stretch]| {
-        let part = &parts[longest];
-        if method != Method::Likelihood {
-            return identify_axis(&part.name, &part.rate, dt, &part.unit, method, choice);
-        }
+    let (part, method) = (&parts[longest], args.method.method());
+    let mut found = if method == Method::Likelihood {
         let logs: Vec<_> = parts.iter().map(Stretch::pieces).collect();
-        identify_logs(&part.name, &part.rate, &logs, dt, &part.unit, choice)
+        identify_logs(&part.name, &part.rate, &logs, dt, &part.unit, choice)?
+    } else {
+        identify_axis(&part.name, &part.rate, dt, &part.unit, method, choice)?
     };
-    let mut found = by_method(&parts)?;
-    let one = parts.len() == 1 && parts[0].is_all() && !args.whole_log;
-    let recent = found.fitted.as_ref().filter(|_| one).and_then(|fitted| recent(&parts[0].rate, dt, fitted));
-    if let Some(recent) = &recent {
-        parts[0].begin_at(recent.start);
-        found = by_method(&parts)?;
-        found.warnings.push(changing(recent, dt));
-    }
-    let part = &parts[longest];
+    let changes = found.fitted.as_ref().and_then(|fitted| recent(&part.rate, dt, fitted));
+    found.warnings.extend(changes.map(|recent| change_words(&recent, part, dt)));
     let warmth = warmth.zip(found.fitted.as_ref()).map(|(warmth, fitted)| warmth.shown(fitted, &parts, longest, dt));
     found.params.temperature = warmth.as_ref().and_then(temperature::Shown::record);
     if dropped > 0 {
@@ -394,12 +382,13 @@ fn identify(
     Ok(Axis { measured, samples: part.rate.len(), left_out: part.left_out, found, warmth })
 }
 
-/// That the noise of the log changes, and what was done about it.
-fn changing(recent: &Recent, dt: f64) -> String {
+/// That the noise of the log changes, and what can be done about it.
+fn change_words(recent: &Recent, part: &Stretch, dt: f64) -> String {
     let seconds = |samples: usize| digits(samples as f64 * dt);
+    let of = if part.left_out > 0 { " of the longest stretch" } else { "" };
     format!(
-        "the noise changes along the log: the last third of it is told better by the {} s before it than by all {} s before it (ln L +{}); \
-         the parameters are of the log from {} s on, the part that tells best what follows; --whole-log takes all of it",
+        "the noise changes along the log: the last third{of} is told better by the {} s before it than by all {} s before it (ln L +{}); what comes after \
+         the log may be told best from {} s on: see what --start gives there; drift is then known from less",
         seconds(recent.part),
         seconds(recent.before),
         digits(recent.gain),

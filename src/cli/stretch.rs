@@ -48,23 +48,6 @@ impl Stretch {
         count
     }
 
-    /// All of the log is the stretch, in one piece.
-    pub(super) fn is_all(&self) -> bool {
-        self.left_out == 0
-    }
-
-    /// Nothing before this sample of the stretch; of a log in one piece.
-    pub(super) fn begin_at(&mut self, start: usize) {
-        self.rate.drain(..start);
-        self.whole.iter_mut().for_each(|(_, samples)| {
-            samples.drain(..start);
-        });
-        self.phase.iter_mut().for_each(|phase| {
-            phase.drain(..start);
-        });
-        self.range.start += start;
-    }
-
     /// What of the log is outside the stretch, on stderr; `role`: of the stretch.
     pub(super) fn print_left_out(&self, role: &str) {
         if let Some(note) = self.left_out_note(role) {

@@ -43,7 +43,7 @@ pub(super) struct Fit {
 /// Starting values of one correlation time, equally spaced in its logarithm; of each of several.
 const STARTS: [usize; 2] = [6, 4];
 /// Starts that are carried on from the diagonal to the full weights.
-const CARRIED: usize = 2;
+const CARRIED: usize = 4;
 const REWEIGHTINGS: usize = 8;
 const WHOLE_STEPS: usize = 3;
 
@@ -503,5 +503,41 @@ mod tests {
         let weights = Weights::diagonal(&points, &model);
         let found = finish(&points, &shape, &weights, &bounds(&points, &shape), moved).unwrap();
         assert!((found.chi_square - best.chi_square).abs() < 0.5, "{} and {}", found.chi_square, best.chi_square);
+    }
+
+    /// Leverages are the diagonal of a projection: they sum to the number of parameters. What is minimised, and its slopes, agree by differences.
+    #[test]
+    fn leverages_sum_to_the_parameters_and_slopes_are_those_of_the_value() {
+        let shape = Shape::new(vec![Kind::White, Kind::GaussMarkov]);
+        let mut rate = vec![0.0; 4000];
+        let terms = [Term::White { density: 0.0562 }, Term::GaussMarkov { std_dev: 0.028, correlation_time: 100.0 }];
+        for (i, term) in terms.iter().enumerate() {
+            let mut part = vec![0.0; rate.len()];
+            term.sample_path(1.0, stream(42, StreamId { run: 0, axis: 0, term: i as u32 })).fill(&mut part);
+            rate.iter_mut().zip(&part).for_each(|(sum, x)| *sum += x);
+        }
+        let curve = allan::curve(&rate, 1.0, Deviation::Oadev, TauGrid::Log(5)).unwrap();
+        let points = Points::of_curve(&curve, Distance::CubeRoots);
+        let (bounds, at) = (bounds(&points, &shape), [0.06_f64.ln(), 0.03_f64.ln(), 90_f64.ln()]);
+        let weights = Weights::of(&points, &shape, &bounds, &at).unwrap();
+        assert!((3.0 * weights.lean.sum() - 3.0).abs() < 1e-9, "{}", weights.lean.sum());
+        // parameters at a bound have no part in them
+        let mut edge = at;
+        edge[2] = bounds[2].1;
+        let fewer = Weights::of(&points, &shape, &bounds, &edge).unwrap();
+        assert!((3.0 * fewer.lean.sum() - 2.0).abs() < 1e-9, "{}", fewer.lean.sum());
+        let place = weights.look(&points, &shape, &at);
+        assert!(place.lean.abs() < 1e-12, "the reference is the model itself");
+        for j in 0..3 {
+            let value = |by: f64| {
+                let mut moved = at;
+                moved[j] += by;
+                weights.look(&points, &shape, &moved).half()
+            };
+            let slope = place.residuals.column(0).dot(&place.residuals.column(j + 1)) + place.lean_slope[j];
+            // differences over 2e-4 of values of about 10: 1e-6 by the third derivative, the derivative by Tc is itself one over 2e-4
+            let found = (value(1e-4) - value(-1e-4)) / 2e-4;
+            assert!((found - slope).abs() < 1e-5 * (1.0 + slope.abs()), "{j}: {found} {slope}");
+        }
     }
 }

@@ -31,7 +31,10 @@ pub struct Recent {
     pub before: usize,
 }
 
-/// The part of the log (SI, contiguous, finite; `dt` in s) at its end from which the parameters of the model should be taken, where that is not all of it.
+/// The part of the log (SI, contiguous, finite; `dt` in s) at its end whose parameters should tell best what follows, where that is not all of it.
+///
+/// The same share of the whole log as that of the first two thirds which told the last third best. A short part knows little of slow drift, whatever it gains:
+/// who takes it should compare.
 ///
 /// `fitted`: the model as [`identify_logs`](crate::identify::identify_logs) found it in all of the log.
 pub fn recent(rate: &[f64], dt: f64, fitted: &Fitted) -> Option<Recent> {

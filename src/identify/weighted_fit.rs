@@ -38,6 +38,8 @@ pub(super) struct Fit {
     /// Whitened sum of squares; of the wavelet moments what is left of it beyond all parameters.
     pub(super) chi_square: f64,
     pub(super) points: usize,
+    /// −2 ln of the density of the variances under this fit, but for a constant: by it maxima with weights of their own compare.
+    surprise: f64,
 }
 
 /// Starting values of one correlation time, equally spaced in its logarithm; of each of several.
@@ -382,7 +384,7 @@ pub(super) fn fit(points: &Points, shape: &Shape) -> Option<Fit> {
     // different starts that arrived at the same place are one
     found.dedup_by(|b, a| a.0.iter().zip(&b.0).all(|(a, b)| (a - b).abs() < 0.02));
     let fits = found.iter().take(CARRIED).filter_map(|(start, _)| reweighted(points, shape, &bounds, start));
-    fits.min_by(|a, b| a.chi_square.total_cmp(&b.chi_square))
+    fits.min_by(|a, b| a.surprise.total_cmp(&b.surprise))
 }
 
 /// Alternate between weights at the parameters and parameters for the weights.
@@ -426,6 +428,8 @@ fn finish(
     let (residuals, jacobian) = split(weights);
     let sum_of_squares = residuals.norm_squared();
     let inverse = nalgebra::Cholesky::new(jacobian.transpose() * &jacobian).map(|c| c.inverse());
+    // wide weights make every residual small: the normal density of the cube roots, as one of the variances, has their price in it
+    let volume: f64 = (0..points.len()).map(|i| weights.factor[(i, i)].ln() + weights.reference[i].ln() / 3.0).sum();
     let (covariance, chi_square) = match points.distance() {
         Distance::CubeRoots => (inverse, sum_of_squares),
         Distance::Variances => {
@@ -449,7 +453,11 @@ fn finish(
             log_sigmas[*index] = covariance[(j, j)].sqrt();
         }
     }
-    Some(Fit { shape: shape.clone(), log_parameters, log_sigmas, chi_square, points: points.len() })
+    let surprise = match points.distance() {
+        Distance::CubeRoots => chi_square + 2.0 * volume,
+        Distance::Variances => chi_square,
+    };
+    Some(Fit { shape: shape.clone(), log_parameters, log_sigmas, chi_square, points: points.len(), surprise })
 }
 
 /// The smallest sum of squares when a term of this coefficient is added to the model and all other parameters stay but the

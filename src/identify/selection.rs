@@ -99,7 +99,7 @@ fn neighbours(shape: &Shape) -> Vec<Shape> {
     found
 }
 
-/// Fit the forced model, or grow one, to the points; if that does not explain the curve, try without the shortest averaging times.
+/// Fit the forced model, or grow one, to the points; if that does not explain the curve (p below 10⁻⁴), try without the shortest averaging times.
 ///
 /// The rule: only averaging factors up to 100 samples may be left out (anti-alias filters and vibration act there), at least
 /// ten points must remain. A model is found on the points beyond; the shorter ones are then taken in, longest first, as long

@@ -1,4 +1,4 @@
-//! Noise that changes along the log: what is told, what is taken, and that noise which stays the same is left alone.
+//! Noise that changes along the log: what is told of it, and that nothing is told of noise which stays the same.
 
 use kfdesign::identify::{Recent, parse_model, recent};
 use kfdesign::noise::Term;
@@ -17,10 +17,10 @@ fn two_levels(levels: [f64; 2], samples: [usize; 2], run: u64) -> Vec<f64> {
     [part(0), part(1)].concat()
 }
 
-/// Thirty logs of each kind: a log has less than one chance in 10⁶. The gain of a part is at most ½ χ²_p (1 + ½), p ≤ 5, for a part as long as
-/// everything before; it must be above 10 + p.
+/// Thirty logs of each kind. The gain of a part is at most about ½ χ²_p (1 + ½), p ≤ 4, and must be above 10 + p: a chance below 9e-4 by that bound, and in truth
+/// far less, since a part would have to be as good as the last third's own parameters. Of 1500 logs of each kind none was told of; the nearest lacked 3.3.
 #[test]
-fn noise_that_stays_the_same_is_taken_whole() {
+fn nothing_is_told_of_noise_that_stays_the_same() {
     let line = Term::Oscillation { std_dev: 0.05, frequency_hz: 0.2, correlation_time: 100.0 };
     let kinds: [(&str, Vec<Term>); 4] = [
         ("white", vec![white(N)]),

@@ -20,7 +20,7 @@ const HOUSE: [(u8, &str, &[&str]); 20] = [
     (3, "consistency", &["filter"]),
     (4, "identify", &[]),
     (4, "tune", &[]),
-    (4, "replay", &[]),
+    (4, "replay", &["identify"]),
     (5, "compare", &[]),
     (5, "montecarlo", &[]),
     (6, "export", &[]),

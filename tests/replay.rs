@@ -1,6 +1,7 @@
 //! Replay against independent filters, its verdicts on right and wrong designs, and its behaviour on damaged logs.
 
 mod command;
+mod follow;
 
 use approx::assert_relative_eq;
 use kfdesign::consistency::Verdict;

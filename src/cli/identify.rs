@@ -388,7 +388,7 @@ fn change_words(recent: &Recent, part: &Stretch, dt: f64) -> String {
     let of = if part.left_out > 0 { " of the longest stretch" } else { "" };
     format!(
         "the noise changes along the log: the last third{of} is told better by the {} s before it than by all {} s before it (ln L +{}); what comes after \
-         the log may be told best from {} s on: see what --start gives there; drift is then known from less",
+         the log may be told best from {} s on: see what --start gives there; drift is then known from less. A filter that finds such noise anew as it runs: replay --follow",
         seconds(recent.part),
         seconds(recent.before),
         digits(recent.gain),

@@ -10,6 +10,7 @@ use anyhow::Context;
 
 use super::Status;
 use super::aid_columns::aid_columns;
+use super::flags::with_unit;
 use super::log_flags::{LogFlags, print_check};
 use super::output::{digits, print_json, print_text, progress, shown_unit, table};
 use super::tests_table::{TESTS, caption, rows};
@@ -18,8 +19,9 @@ use crate::export::atomic::{AtomicFile, refuse_input_as_output};
 use crate::export::table::TableWriter;
 use crate::filter::{AttitudeDesign, FilterDesign, Form};
 use crate::input::{Block, LogOptions, LogReader};
+use crate::replay::follow::FollowedParameter;
 use crate::replay::{AxisResult, Estimates, LogShape, Options, ReplayResult, Replayer};
-use crate::units::{Quantity, Unit};
+use crate::units::{Dimension, Quantity, Unit};
 
 /// A recorded log through filter.json, with a verdict
 ///
@@ -54,6 +56,10 @@ pub struct Args {
     /// How the filter carries its covariance
     #[arg(long, value_enum, default_value_t = FormFlag::Joseph, conflicts_with = "smooth")]
     form: FormFlag,
+    /// Find the wideband noise (white, moving average, quantization, lines) anew as the log goes on, from its last samples: 1000s, 20min. Until there are
+    /// as many the design stands for the rest, so no longer than the log it was identified from; only for a sensor at rest
+    #[arg(long, value_name = "DURATION", conflicts_with = "smooth")]
+    follow: Option<String>,
     /// One HTML page with tables and figures
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
@@ -93,6 +99,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
             FormFlag::SquareRoot => Form::SquareRoot,
             FormFlag::ConstantGain => Form::ConstantGain,
         },
+        follow: args.follow.as_deref().map(|text| with_unit("--follow", text, Dimension::TIME, "1000s")).transpose()?,
     };
     options.check()?;
     if AttitudeDesign::is(&args.filter) {
@@ -284,8 +291,13 @@ fn text(result: &ReplayResult, unit: Option<&Unit>) -> String {
             table(&TESTS, &rows(&result.tests, result.alpha))
         )
     };
+    let followed = follow_rows(result);
+    let followed = match followed.is_empty() {
+        true => String::new(),
+        false => format!("\n{FOLLOWED_CAPTION}:\n{}", table(&FOLLOWED, &followed)),
+    };
     format!(
-        "{}\nEstimates at the end of the log, with the filter's own sigma:\n{states}{tests}\n{}: {}\n",
+        "{}\nEstimates at the end of the log, with the filter's own sigma:\n{states}{followed}{tests}\n{}: {}\n",
         table(&COUNTS, &count_rows(result)),
         result.verdict.word(),
         result.meaning
@@ -301,6 +313,21 @@ fn count_rows(result: &ReplayResult) -> Vec<Vec<String>> {
         row
     };
     result.axes.iter().map(row).collect()
+}
+
+const FOLLOWED_CAPTION: &str = "Noise that was followed, SI";
+const FOLLOWED: [&str; 5] = ["axis", "parameter", "design", "end of the log", "unit"];
+
+fn follow_rows(result: &ReplayResult) -> Vec<Vec<String>> {
+    let of = |axis: &AxisResult| {
+        let name = axis.name.clone();
+        let parameters = axis.follow.iter().flat_map(|follow| &follow.parameters);
+        let row = move |p: &FollowedParameter| {
+            vec![name.clone(), p.parameter.clone(), digits(p.design), digits(p.end), p.unit.clone()]
+        };
+        parameters.map(row).collect::<Vec<_>>()
+    };
+    result.axes.iter().flat_map(of).collect()
 }
 
 /// The whole estimate of each axis, and its states where they are few; all are in the JSON document. Measurements of one axis share them.

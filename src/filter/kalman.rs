@@ -100,6 +100,13 @@ impl Kalman {
         }
     }
 
+    /// From here on the matrices of `model`, which has the same states; x and P stay.
+    pub fn change(&mut self, model: &LinearModel) {
+        let (x, p) = (std::mem::take(&mut self.x), std::mem::take(&mut self.p));
+        assert_eq!(model.x0.len(), x.len(), "states");
+        *self = Kalman { x, p, ..Kalman::new(model) };
+    }
+
     /// x ← F x, P ← F P Fᵀ + Q.
     #[inline]
     pub fn predict(&mut self) {

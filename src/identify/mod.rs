@@ -10,6 +10,7 @@ mod selection;
 mod shape;
 mod weighted_fit;
 
+pub use likelihood::follow::{Followed, Follower};
 pub use likelihood::maximum::maximum;
 pub use likelihood::recent::{Recent, recent};
 pub use likelihood::{Fitted, plan, temperature, windows};

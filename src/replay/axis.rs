@@ -2,6 +2,7 @@
 
 use nalgebra::DVector;
 
+use super::follow::Following;
 use super::trace::Trace;
 use super::{LAGS, NIS_BINS, Options, Roles};
 use crate::consistency::low_frequency::{LowFrequency, time_constants};
@@ -36,6 +37,8 @@ pub(super) struct AxisReplay {
     pub(super) missing: u64,
     /// For smoothing.
     pub(super) history: Option<History>,
+    /// Whose noise is found anew along the log.
+    pub(super) following: Option<Following>,
     /// The same filter for whole stretches of the log, where it can be run so.
     stretches: Option<Stretches>,
 }
@@ -91,17 +94,24 @@ pub(super) struct StartTest {
 }
 
 impl AxisReplay {
-    pub(super) fn new(design: &AxisDesign, filter: Running, roles: Roles, options: &Options) -> AxisReplay {
+    pub(super) fn new(
+        design: &AxisDesign,
+        filter: Running,
+        roles: Roles,
+        options: &Options,
+        following: Option<Following>,
+    ) -> AxisReplay {
         let model = &design.model;
         let settling = design.steady_state.settling_time / model.dt;
         let channels: Vec<Channel> = (0..model.measurements.len()).map(|i| Channel::new(design, i)).collect();
         // what figures show beside the measurement must be what the measurement sees
         let plain = roles.own == 1 && model.inputs.is_empty() && channels.len() == 1 && !channels[0].angle;
         let seen = || channels[0].row.iter().eq(channels[0].h.iter());
-        let stretches = (options.form == Form::Joseph && options.gate.is_none() && plain && seen())
-            .then(|| TwoStage::new(model))
-            .flatten()
-            .map(|filter| Stretches::new(filter, model.r[(0, 0)]));
+        let stretches =
+            (options.form == Form::Joseph && options.gate.is_none() && following.is_none() && plain && seen())
+                .then(|| TwoStage::new(model))
+                .flatten()
+                .map(|filter| Stretches::new(filter, model.r[(0, 0)]));
         AxisReplay {
             filter,
             input: None,
@@ -118,6 +128,7 @@ impl AxisReplay {
             gaps: 0,
             missing: 0,
             history: None,
+            following,
         }
     }
 
@@ -208,6 +219,9 @@ impl AxisReplay {
         } else {
             self.unusable += 1;
         }
+        if self.following.is_some() {
+            self.follow(sensor);
+        }
         if self.roles.known_input {
             match aids.next().filter(|u| u.is_finite()) {
                 Some(u) => self.input = Some(u),
@@ -218,6 +232,19 @@ impl AxisReplay {
             if z.is_finite() {
                 self.update(index, z, time_s);
             }
+        }
+    }
+
+    /// The noise as the samples so far have it.
+    fn follow(&mut self, sensor: f64) {
+        let (Some(following), Running::Joseph(kalman)) = (&mut self.following, &mut self.filter) else { return };
+        let channel = &self.channels[0];
+        let used = channel.last.is_some_and(|update| update.accepted);
+        let value = if used { sensor } else { channel.h.dot(&kalman.x) };
+        if let Some(model) = following.take(value) {
+            kalman.change(&model);
+            // the answer to a shift of x0 is that of the design
+            self.start.shifted = None;
         }
     }
 
@@ -263,6 +290,7 @@ impl AxisReplay {
         let steps = missing.saturating_add(1);
         self.start.predict(steps, input);
         if missing > 0 {
+            self.following.iter_mut().for_each(Following::interrupt);
             self.gaps += 1;
             self.missing = self.missing.saturating_add(missing);
             for channel in &mut self.channels[..self.roles.own] {

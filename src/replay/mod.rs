@@ -10,6 +10,7 @@
 pub mod attitude;
 pub mod axes;
 mod axis;
+pub mod follow;
 pub mod trace;
 pub mod verdict;
 
@@ -27,6 +28,7 @@ use crate::params::PlantEntry;
 use crate::units::Quantity;
 
 use axis::AxisReplay;
+use follow::{FollowResult, Following};
 pub use trace::{Point, Trace};
 
 /// Number of autocorrelation lags that are tested.
@@ -44,11 +46,14 @@ pub struct Options {
     /// Such a sample still moves the estimate, as far as one at the gate would.
     pub clip: bool,
     pub form: Form,
+    /// The wideband noise is that of the last samples, so many seconds of them; before there are as many, the design stands for the rest. Only for sensors
+    /// at rest and [`Form::Joseph`].
+    pub follow: Option<f64>,
 }
 
 impl Default for Options {
     fn default() -> Options {
-        Options { alpha: 0.01, gate: None, clip: false, form: Form::Joseph }
+        Options { alpha: 0.01, gate: None, clip: false, form: Form::Joseph, follow: None }
     }
 }
 
@@ -57,6 +62,9 @@ impl Options {
     pub fn check(&self) -> Result<(), ReplayError> {
         if !(self.alpha > 0.0 && self.alpha < 1.0) {
             return Err(ReplayError::Option { name: "alpha", value: self.alpha, expected: "between 0 and 1" });
+        }
+        if let Some(value) = self.follow.filter(|follow| !(*follow > 0.0 && follow.is_finite())) {
+            return Err(ReplayError::Option { name: "follow", value, expected: "seconds, more than 0" });
         }
         match self.gate {
             Some(gate) if !(gate >= 1.0 && gate.is_finite()) => {
@@ -151,6 +159,8 @@ pub enum ReplayError {
     Inputs { inputs: String },
     #[error("axis '{axis}': Q and P0 have no square root: {source}")]
     SquareRoot { axis: String, source: LinalgError },
+    #[error("axis '{axis}': its noise cannot be followed: {reason}")]
+    Follow { axis: String, reason: String },
     #[error("{name} is {value}, expected {expected}")]
     Option { name: &'static str, value: f64, expected: &'static str },
 }
@@ -282,6 +292,9 @@ pub struct AxisResult {
     pub whiteness: Option<WhitenessSummary>,
     pub low_frequency: Vec<LowFrequencySummary>,
     pub start: Option<Start>,
+    /// Where the noise was followed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub follow: Option<FollowResult>,
     /// For figures; not part of the document.
     #[serde(skip)]
     pub sight: Sight,
@@ -349,7 +362,9 @@ impl Replayer {
         let start = |axis: &AxisDesign| {
             let filter = Running::new(options.form, axis)
                 .map_err(|source| ReplayError::SquareRoot { axis: axis.name.clone(), source })?;
-            Ok(AxisReplay::new(axis, filter, Roles::new(design, &axis.model)?, &options))
+            let following =
+                options.follow.map(|memory_s| following(design, axis, options.form, memory_s)).transpose()?;
+            Ok(AxisReplay::new(axis, filter, Roles::new(design, &axis.model)?, &options, following))
         };
         let axes = design.axes.iter().map(start).collect::<Result<Vec<_>, ReplayError>>()?;
         Ok(Replayer {
@@ -419,6 +434,20 @@ impl Replayer {
         self.axes.iter_mut().for_each(AxisReplay::flush);
         verdict::conclude(self)
     }
+}
+
+fn following(design: &FilterDesign, axis: &AxisDesign, form: Form, memory_s: f64) -> Result<Following, ReplayError> {
+    let failed = |reason: String| ReplayError::Follow { axis: axis.name.clone(), reason };
+    if design.plant != "static" {
+        return Err(failed(format!(
+            "the plant is '{}', and only of a sensor at rest is all that is measured noise",
+            design.plant
+        )));
+    }
+    if form != Form::Joseph {
+        return Err(failed("only the form joseph takes new noise".into()));
+    }
+    Following::new(axis, design.quantity, memory_s).map_err(failed)
 }
 
 impl AxisEstimates {

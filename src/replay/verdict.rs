@@ -7,6 +7,7 @@
 //! [`effect::judge`] states how p-values and effect sizes make the verdict.
 
 use super::axis::{AxisReplay, Channel};
+use super::follow::Following;
 use super::{
     AxisResult, FinalState, LowFrequencySummary, Nis, Options, ReplayResult, Replayer, Sight, Start, WhitenessSummary,
 };
@@ -41,10 +42,14 @@ pub(super) fn conclude(replayer: Replayer) -> ReplayResult {
         }
     }
     let verdict = effect::judge(&mut tests, options.alpha, short.is_empty());
+    let mut meaning = meaning(verdict, options.alpha, &tests, &results, &short);
+    if options.follow.is_some() {
+        meaning.push_str("; the wideband noise is that found along the log, not that of the design");
+    }
     ReplayResult {
         format: "kfdesign-replay/1".to_string(),
         verdict,
-        meaning: meaning(verdict, options.alpha, &tests, &results, &short),
+        meaning,
         alpha: options.alpha,
         log: None,
         log_sha256: None,
@@ -122,6 +127,7 @@ fn axis_result(view: &View<'_>, log_axis: String, options: &Options) -> (AxisRes
         whiteness: None,
         low_frequency: Vec::new(),
         start: None,
+        follow: axis.following.as_ref().map(Following::result),
         sight: Sight {
             trace: channel.trace.points().to_vec(),
             samples_per_point: channel.trace.samples_per_point(),

@@ -65,6 +65,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         ("--smooth", args.smooth),
         ("--gate", args.gate.is_some()),
         ("--robust", args.robust.is_some()),
+        ("--follow", args.follow.is_some()),
         ("--form", args.form != FormFlag::Joseph),
         ("--report", args.report.is_some()),
         ("--plot", args.plot.is_some()),

@@ -1,6 +1,6 @@
 //! Figures and the report page of a replay: a view of [`ReplayResult`].
 
-use super::{COUNTS, STATES, count_rows, in_log_unit, state_rows};
+use super::{COUNTS, FOLLOWED, FOLLOWED_CAPTION, STATES, count_rows, follow_rows, in_log_unit, state_rows};
 use crate::cli::output::digits;
 use crate::cli::tests_table::{self, TESTS, caption};
 use crate::numerics::distribution::{chi_square_cdf, chi_square_sf};
@@ -30,9 +30,13 @@ pub(super) fn page(result: &ReplayResult, filter: &str, unit: Option<&Unit>) -> 
     if let Some(gate) = result.gate {
         provenance.push(("gate".to_string(), format!("{gate} sigma")));
     }
-    let summary = Section::new("Summary")
+    let mut summary = Section::new("Summary")
         .table("Samples and log-likelihood (SI units)", &COUNTS, count_rows(result))
         .table("Estimates at the end of the log, with the filter's own sigma", &STATES, state_rows(result, unit));
+    let followed = follow_rows(result);
+    if !followed.is_empty() {
+        summary = summary.table(FOLLOWED_CAPTION, &FOLLOWED, followed);
+    }
     let mut tests = Section::new("Tests of the innovations");
     tests = if result.tests.is_empty() {
         tests.warning("Too few samples for any test.")

@@ -1,10 +1,11 @@
 //! Maximum likelihood on the cosine coefficients of the log: terms chosen, intervals given, the Cramér-Rao bound beside them.
 //!
 //! `ordinates` is the log in bins, `form` what a model consists of, `whittle` the likelihood and its maximum, `growth` the choice of the
-//! terms, `interval` what is known of each parameter, `sums` of several together, `plan` how long a log must be for that, `recent` whether it stays the same along the log,
+//! terms, `interval` what is known of each parameter, `sums` of several together, `plan` how long a log must be for that, `recent` whether it stays the same along the log, `follow` what of it is new,
 //! `temperature` what of it follows the temperature.
 
 mod exact;
+pub(super) mod follow;
 mod form;
 mod growth;
 mod interval;
@@ -112,7 +113,7 @@ impl Whole<'_> {
             }));
         };
 
-        let Fitted { fit, known } = &fitted;
+        let Fitted { fit, known, .. } = &fitted;
         let words = Words { data: &data, display };
         let terms = known_terms(&data, fit, known);
         let all_known = terms.len() == fit.form.pieces().len();
@@ -238,6 +239,8 @@ fn fits(data: &Ordinates, choice: &ModelChoice) -> Vec<(Fit, Vec<Precision>)> {
 pub struct Fitted {
     fit: Fit,
     known: Vec<Precision>,
+    /// Of the log that was fitted.
+    lines: Vec<Line>,
 }
 
 /// From the maximum on the cosine coefficients to that of the exact likelihood of all logs, where there are any and it can be had; searched
@@ -252,12 +255,14 @@ fn refine(
     let bounds = whittle::bounds(data, &start.form, &start.logs);
     let exact = Exact::new(data, &start.form, &start.logs, logs).filter(|_| !logs.is_empty());
     let refined = exact.and_then(|exact| exact.refine(&start.logs, &bounds));
+    let lines = data.lines.clone();
     let fitted = match &refined {
         Some(refined) => Fitted {
             fit: Fit { logs: refined.logs.clone(), ..on_cosines.clone() },
             known: moved(on_cosines, known, refined, data, logs),
+            lines,
         },
-        None => Fitted { fit: on_cosines.clone(), known: known.to_vec() },
+        None => Fitted { fit: on_cosines.clone(), known: known.to_vec(), lines },
     };
     (fitted, refined)
 }

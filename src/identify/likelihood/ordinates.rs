@@ -43,7 +43,7 @@ pub(super) struct Ordinates {
     pub(super) lines: Vec<Line>,
     /// Of the log, or of each of its windows.
     pub(super) samples: usize,
-    pub(super) windows: usize,
+    pub(super) windows: f64,
     /// s.
     pub(super) dt: f64,
 }
@@ -79,7 +79,7 @@ impl Ordinates {
         };
         let bins: Vec<Bin> = layout(coefficients.len(), step, &lines).into_par_iter().map(bin).collect();
         let grid = Grid::new(bins.iter().map(|bin: &Bin| bin.frequency_hz).collect(), dt);
-        Ordinates { bins, grid, lines, samples: n, windows: 1, dt }
+        Ordinates { bins, grid, lines, samples: n, windows: 1.0, dt }
     }
 
     /// Windows of the same length and lines taken together; `None` of none.
@@ -101,6 +101,15 @@ impl Ordinates {
         }
     }
 
+    /// As if so many more windows, or parts of one, had been seen in which every coefficient is just what `spectrum` expects of it.
+    pub(super) fn pretend(&mut self, windows: f64, spectrum: &[f64]) {
+        for (bin, s) in self.bins.iter_mut().zip(spectrum) {
+            bin.power += windows * bin.count * s;
+            bin.count *= 1.0 + windows;
+        }
+        self.windows += windows;
+    }
+
     /// What a log of so many samples would have before it is recorded: bins without power. `grid` is made of their frequencies.
     pub(super) fn expected(samples: usize, dt: f64, lines: &[Line], grid: impl Fn(&[f64]) -> Grid) -> Ordinates {
         let step = 1.0 / (2.0 * samples as f64 * dt);
@@ -114,7 +123,7 @@ impl Ordinates {
         };
         let bins: Vec<Bin> = layout(samples.saturating_sub(1), step, lines).into_iter().map(bin).collect();
         let grid = grid(&bins.iter().map(|bin| bin.frequency_hz).collect::<Vec<f64>>());
-        Ordinates { bins, grid, lines: lines.to_vec(), samples, windows: 1, dt }
+        Ordinates { bins, grid, lines: lines.to_vec(), samples, windows: 1.0, dt }
     }
 
     /// Around a frequency: where bins are at most twice as wide as there, and how wide they are there, Hz.
@@ -125,7 +134,7 @@ impl Ordinates {
         let first = (0..at).rev().take_while(|i| self.bins[*i].count <= most).last().unwrap_or(at);
         let last = (at..self.bins.len()).take_while(|i| self.bins[*i].count <= most).last().unwrap_or(at);
         let (low, high) = (self.bins[first].frequency_hz, self.bins[last].frequency_hz);
-        (low.min(frequency_hz), high.max(frequency_hz), self.bins[at].count / self.windows as f64 * step)
+        (low.min(frequency_hz), high.max(frequency_hz), self.bins[at].count / self.windows * step)
     }
 
     /// Length of the log, or of each of its windows, s.
@@ -135,7 +144,7 @@ impl Ordinates {
 
     /// Length of all windows, s.
     pub(super) fn total_s(&self) -> f64 {
-        self.windows as f64 * self.span_s()
+        self.windows * self.span_s()
     }
 }
 

@@ -40,11 +40,11 @@ pub struct Recent {
 pub fn recent(rate: &[f64], dt: f64, fitted: &Fitted) -> Option<Recent> {
     let fit = &fitted.fit;
     let before = (rate.len() as f64 * FITTED_SHARE) as usize;
-    let lines = Ordinates::new(rate, dt, None).lines;
-    let late = Ordinates::new(&rate[before..], dt, Some(&lines));
+    let lines = &fitted.lines;
+    let late = Ordinates::new(&rate[before..], dt, Some(lines));
     let told = |step: usize| {
         let start = before * step / STEPS;
-        let early = Ordinates::new(&rate[start..before], dt, Some(&lines));
+        let early = Ordinates::new(&rate[start..before], dt, Some(lines));
         let seen = whittle::climb_all(&early, &fit.form, &fit.logs)?;
         Some((step, whittle::log_likelihood(&late, &fit.form, &seen.logs)))
     };

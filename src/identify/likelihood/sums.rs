@@ -55,7 +55,7 @@ pub(super) fn sums(data: &Ordinates, fit: &Fit, information: Option<&DMatrix<f64
 }
 
 /// Of the logarithms; a ramp is none.
-fn terms<'a>(form: &'a Form, logs: &'a [f64]) -> impl Iterator<Item = Term> {
+pub(super) fn terms<'a>(form: &'a Form, logs: &'a [f64]) -> impl Iterator<Item = Term> {
     form.split(logs).filter_map(|(piece, own)| {
         let values: Vec<f64> = own.iter().map(|v| v.exp()).collect();
         piece.term(&values)

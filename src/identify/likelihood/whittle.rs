@@ -50,8 +50,13 @@ struct Spectrum {
 impl Fit {
     /// At every bin, without a ramp.
     pub(super) fn spectrum(&self, data: &Ordinates) -> Vec<f64> {
-        spectrum(data, &self.form, &self.logs, &Held::nothing(data, &self.form), false).total
+        spectrum_of(data, &self.form, &self.logs)
     }
+}
+
+/// Of a form at every bin, without a ramp.
+pub(super) fn spectrum_of(data: &Ordinates, form: &Form, logs: &[f64]) -> Vec<f64> {
+    spectrum(data, form, logs, &Held::nothing(data, form), false).total
 }
 
 /// What stays while others are searched: the pieces of which no logarithm is free.

@@ -18,8 +18,8 @@ use crate::consistency::Verdict;
 use crate::export::atomic::{AtomicFile, refuse_input_as_output};
 use crate::export::table::TableWriter;
 use crate::filter::{AttitudeDesign, FilterDesign, Form};
+use crate::identify::Followed;
 use crate::input::{Block, LogOptions, LogReader};
-use crate::replay::follow::FollowedParameter;
 use crate::replay::{AxisResult, Estimates, LogShape, Options, ReplayResult, Replayer};
 use crate::units::{Dimension, Quantity, Unit};
 
@@ -322,8 +322,8 @@ fn follow_rows(result: &ReplayResult) -> Vec<Vec<String>> {
     let of = |axis: &AxisResult| {
         let name = axis.name.clone();
         let parameters = axis.follow.iter().flat_map(|follow| &follow.parameters);
-        let row = move |p: &FollowedParameter| {
-            vec![name.clone(), p.parameter.clone(), digits(p.design), digits(p.end), p.unit.clone()]
+        let row = move |p: &Followed| {
+            vec![name.clone(), p.parameter.clone(), digits(p.design), digits(p.now), p.unit.clone()]
         };
         parameters.map(row).collect::<Vec<_>>()
     };

@@ -29,17 +29,8 @@ pub struct FollowResult {
     pub every_s: f64,
     /// How often new parameters were taken.
     pub changes: u64,
-    /// As in params.json, SI.
-    pub parameters: Vec<FollowedParameter>,
-}
-
-/// A parameter at the end of the log, SI.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct FollowedParameter {
-    pub parameter: String,
-    pub unit: String,
-    pub design: f64,
-    pub end: f64,
+    /// As designed and at the end of the log.
+    pub parameters: Vec<Followed>,
 }
 
 /// One axis.
@@ -134,14 +125,11 @@ impl Following {
     pub(super) fn result(&self) -> FollowResult {
         let dt = self.model.dt;
         let unit = Unit::parse(self.quantity.si_unit()).unwrap_or_else(|_| Unit::one());
-        let parameters = self.follower.parameters(&unit).into_iter();
-        let parameter =
-            |p: Followed| FollowedParameter { parameter: p.name, unit: p.unit, design: p.design, end: p.now };
         FollowResult {
             memory_s: self.memory as f64 * dt,
             every_s: self.every as f64 * dt,
             changes: self.changes,
-            parameters: parameters.map(parameter).collect(),
+            parameters: self.follower.parameters(&unit),
         }
     }
 }

@@ -142,7 +142,7 @@ fn the_filter_is_that_of_what_was_found() {
         let (followed, result) = innovations(&designed(&terms), &z, &vec![0; z.len()], following(3200.0));
         let found = result.follow.unwrap();
         assert_eq!(found.changes, 1);
-        let value = |name: &str| found.parameters.iter().find(|p| p.parameter == name).map(|p| p.end);
+        let value = |name: &str| found.parameters.iter().find(|p| p.parameter == name).map(|p| p.now);
         let end: Vec<Term> = terms
             .iter()
             .map(|term| match *term {
@@ -245,7 +245,7 @@ fn a_line_that_moves_is_followed() {
     assert!(r < 5.0 / 40_000_f64.sqrt() && (nis - 1.0).abs() < 0.03, "{r} {nis}");
     let frequency =
         followed["follow"]["parameters"].as_array().unwrap().iter().find(|p| p["parameter"] == "oscillation.frequency");
-    let end = frequency.unwrap()["end"].as_f64().unwrap();
+    let end = frequency.unwrap()["now"].as_f64().unwrap();
     assert!((end - 11.05).abs() < 0.1, "{end}");
     let text = run("--follow 40s").1;
     for words in ["Noise that was followed", "oscillation.frequency", "found along the log, not that of the design"] {
@@ -332,7 +332,7 @@ fn what_is_not_used_is_not_learnt_from() {
     assert_eq!(found[0], found[1]);
     z[500] = 0.5;
     found[1] = innovations(&design, &z, &vec![0; z.len()], options).1.follow.unwrap();
-    let density = |i: usize| found[i].parameters[0].end;
+    let density = |i: usize| found[i].parameters[0].now;
     assert!((density(0) / density(1) - 1.0).abs() < 0.01, "{} {}", density(0), density(1));
 }
 

@@ -8,6 +8,9 @@
 //! Only what is no drift (also Gauss-Markov processes of a few samples) is free: a window says less about slow noise than the log of the design did.
 //! Sources: Whittle 1953; Mehra 1972 (adaptive filtering by maximum likelihood); Bernardo & Smith 2000, section 5.2 (conjugate priors as data).
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use super::form::Form;
 use super::names::{name_of, unit_of};
 use super::ordinates::Ordinates;
@@ -18,7 +21,9 @@ use crate::noise::{Kind, NoiseModel, Term};
 use crate::signal::lines::Line;
 use crate::units::Unit;
 
-/// The noise of one axis as designed and as it is now.
+/// The noise of one axis as designed and as it is now, wideband terms at the minimum of
+/// −ln L(θ) = ½ Σ_j [(1 + w) ln S_j(θ) + (dt c_j² + w S⁰_j)/S_j(θ)]: c_j cosine coefficients of the last n samples, S⁰ the sampled spectrum of the design,
+/// w = (m − n)/n for a memory of m samples (Whittle 1953; the design as a conjugate prior). Drift stays as designed.
 #[derive(Clone, Debug)]
 pub struct Follower {
     form: Form,
@@ -32,14 +37,14 @@ pub struct Follower {
 }
 
 /// A parameter that is followed, SI.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Followed {
     /// As in params.json: `oscillation[1].frequency`.
-    pub name: String,
-    pub design: f64,
-    pub now: f64,
-    /// SI.
+    pub parameter: String,
     pub unit: String,
+    pub design: f64,
+    /// After the last samples.
+    pub now: f64,
 }
 
 impl Follower {
@@ -108,10 +113,10 @@ impl Follower {
     pub fn parameters(&self, unit: &Unit) -> Vec<Followed> {
         let unit = |i: usize| unit_of(&self.form, i, unit).text().to_string();
         let of = |&i: &usize| Followed {
-            name: name_of(&self.form, i),
+            parameter: name_of(&self.form, i),
+            unit: unit(i),
             design: self.design[i].exp(),
             now: self.now[i].exp(),
-            unit: unit(i),
         };
         self.free.iter().map(of).collect()
     }

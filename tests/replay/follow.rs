@@ -1,5 +1,6 @@
 //! A filter that follows its noise: what it finds, that it is the filter of what it found, that it looks at nothing that comes later.
 
+use kfdesign::consistency::Verdict;
 use kfdesign::filter::FilterDesign;
 use kfdesign::identify::Follower;
 use kfdesign::noise::{NoiseModel, Term};
@@ -8,6 +9,8 @@ use kfdesign::params::Params;
 use kfdesign::replay::{AxisResult, Estimates, LogShape, Options, Replayer};
 use kfdesign::tune::{TuneOptions, tune};
 use kfdesign::units::Quantity;
+
+use rayon::prelude::*;
 
 use super::{block, replay, shape};
 use crate::support::Bench;
@@ -350,4 +353,46 @@ fn the_state_stays() {
     assert_eq!(followed.follow.as_ref().unwrap().changes, 3000 / 63);
     let (_, short) = innovations(&design, &z[..63], &missing[..63], Options::default());
     assert_eq!(followed.start.unwrap().sigmas, short.start.unwrap().sigmas);
+}
+
+/// `cargo test --release -- --ignored --nocapture follow_study`: verdicts on 300 logs of five minutes each of the design's own noise, and on filters whose drift
+/// is 1.5 times too large or too small, by memory.
+#[test]
+#[ignore = "prints a table for docs/validation.md"]
+fn follow_study() {
+    let noise = |factor: f64| {
+        [
+            Term::White { density: 0.002 },
+            line(0.02, 12.0, 1.0),
+            Term::GaussMarkov { std_dev: 0.002 * factor, correlation_time: 5.0 },
+        ]
+    };
+    let designs = [1.0, 1.5, 1.0 / 1.5].map(|factor| designed(&noise(factor)));
+    for memory in [None, Some(100.0), Some(30.0), Some(10.0), Some(3.0)] {
+        let run = |run: u64| {
+            let z = path(&noise(1.0), 30_000, 79, run);
+            let options = Options { follow: memory, ..Options::default() };
+            designs.each_ref().map(|design| {
+                let result = replay(design, &z, options);
+                let axis = &result.axes[0];
+                let white = axis.whiteness.as_ref().unwrap();
+                let broken = white.max_abs_autocorrelation > 3.72 / 30_000_f64.sqrt();
+                let wrong = result.verdict == Verdict::Inconsistent;
+                (wrong, axis.nis.unwrap().mean, broken, axis.log_likelihood)
+            })
+        };
+        let all: Vec<_> = (0..300).into_par_iter().map(run).collect();
+        let wrong = |i: usize| all.iter().filter(|logs| logs[i].0).count();
+        let mean = |of: &dyn Fn(f64) -> f64| all.iter().map(|logs| of(logs[0].1)).sum::<f64>() / 300.0;
+        let middle = mean(&|nis| nis);
+        println!(
+            "memory {memory:?}: inconsistent {} (drift right), {} (too large), {} (too small); NIS {middle:.4}, sd {:.4}; max |r| beyond its 1 % bound {}; ln L {:.1}",
+            wrong(0),
+            wrong(1),
+            wrong(2),
+            mean(&|nis| (nis - middle).powi(2)).sqrt(),
+            all.iter().filter(|logs| logs[0].2).count(),
+            all.iter().map(|logs| logs[0].3).sum::<f64>() / 300.0,
+        );
+    }
 }

@@ -137,7 +137,7 @@ const WIDEST_INTERVAL: f64 = 10.0;
 const LENGTHS_TO_TELL: f64 = 20.0;
 
 /// Fewest samples from which anything is identified: three averages of ten samples.
-const FEWEST_SAMPLES: usize = 30;
+pub const FEWEST_SAMPLES: usize = 30;
 
 /// Identify one axis. `rate` SI, contiguous, finite; `dt` in s; `display` the unit of the log, in whose family results are written.
 ///

@@ -219,9 +219,7 @@ impl AxisReplay {
         } else {
             self.unusable += 1;
         }
-        if self.following.is_some() {
-            self.follow(sensor);
-        }
+        self.follow(sensor);
         if self.roles.known_input {
             match aids.next().filter(|u| u.is_finite()) {
                 Some(u) => self.input = Some(u),
@@ -235,7 +233,7 @@ impl AxisReplay {
         }
     }
 
-    /// The noise as the samples so far have it.
+    /// The noise as the samples so far have it, where it is followed.
     fn follow(&mut self, sensor: f64) {
         let (Some(following), Running::Joseph(kalman)) = (&mut self.following, &mut self.filter) else { return };
         let channel = &self.channels[0];

@@ -7,16 +7,14 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::filter::AxisDesign;
-use crate::identify::{Followed, Follower};
+use crate::identify::{FEWEST_SAMPLES, Followed, Follower};
 use crate::model::{InitialBias, LinearModel, sensor_errors};
 use crate::units::{Quantity, Unit, digits};
 
 /// The noise is looked for so often within its memory …
 const TIMES: usize = 16;
-/// … but not more often than every so many samples, the fewest that say anything.
-const FEWEST: usize = 30;
-/// Shortest memory.
-const SHORTEST: usize = 4 * FEWEST;
+/// … but not more often than every [`FEWEST_SAMPLES`]. Shortest memory:
+const SHORTEST: usize = 4 * FEWEST_SAMPLES;
 /// Relative difference of matrices that count as the same.
 const SAME: f64 = 1e-6;
 
@@ -75,7 +73,7 @@ impl Following {
         if !holds(&model, &built, &moved, &places) {
             return Err(other.into());
         }
-        let every = memory.div_ceil(TIMES).max(FEWEST);
+        let every = memory.div_ceil(TIMES).max(FEWEST_SAMPLES);
         let window = VecDeque::new();
         Ok(Following { follower, window, memory, every, left: every, changes: 0, quantity, model, built, places })
     }
@@ -94,8 +92,9 @@ impl Following {
         if !self.follower.follow(self.window.make_contiguous()) {
             return None;
         }
+        let model = self.changed()?;
         self.changes += 1;
-        self.changed()
+        Some(model)
     }
 
     /// After a gap the window begins anew.

@@ -1,7 +1,7 @@
 //! Maximum likelihood on the cosine coefficients of the log: terms chosen, intervals given, the Cramér-Rao bound beside them.
 //!
 //! `ordinates` is the log in bins, `form` what a model consists of, `whittle` the likelihood and its maximum, `growth` the choice of the
-//! terms, `interval` what is known of each parameter, `sums` of several together, `plan` how long a log must be for that, `recent` whether it stays the same along the log, `follow` what of it is new,
+//! terms, `interval` what is known of each parameter, `sums` of several together, `plan` how long a log must be for that, `recent` whether it stays the same along the log, `follow` the wideband part of it anew from the last samples,
 //! `temperature` what of it follows the temperature.
 
 mod exact;

@@ -43,8 +43,14 @@ pub(super) fn conclude(replayer: Replayer) -> ReplayResult {
     }
     let verdict = effect::judge(&mut tests, options.alpha, short.is_empty());
     let mut meaning = meaning(verdict, options.alpha, &tests, &results, &short);
-    if options.follow.is_some() {
+    let changes: Vec<u64> =
+        results.iter().filter_map(|axis| axis.follow.as_ref()).map(|follow| follow.changes).collect();
+    if changes.iter().any(|changes| *changes > 0) {
         meaning.push_str("; the wideband noise is that found along the log, not that of the design");
+    } else if !changes.is_empty() {
+        meaning.push_str(
+            "; beside so long a memory the log is too short to find any noise anew: it is that of the design",
+        );
     }
     ReplayResult {
         format: "kfdesign-replay/1".to_string(),

@@ -256,6 +256,19 @@ fn a_line_that_moves_is_followed() {
     }
 }
 
+/// A memory beside which the log is short changes nothing, and says so.
+#[test]
+fn too_long_a_memory_is_told() {
+    let design = designed(&[Term::White { density: 0.002 }, line(0.01, 12.0, 2.0)]);
+    let z = path(&[Term::White { density: 0.002 }], 6000, 80, 0);
+    let result = |memory_s: f64| replay(&design, &z, following(memory_s));
+    let long = result(1e30);
+    assert_eq!(long.axes[0].follow.as_ref().unwrap().changes, 0);
+    assert!(long.meaning.ends_with("it is that of the design"), "{}", long.meaning);
+    let short = result(20.0);
+    assert!(short.meaning.ends_with("not that of the design"), "{}", short.meaning);
+}
+
 /// What cannot be followed is refused with one line and exit 2.
 #[test]
 fn refusals() {

@@ -488,7 +488,7 @@ fn odd_logs_are_survived() {
 fn model_names() {
     use kfdesign::noise::Kind;
     let kinds = |text: &str| match parse_model(text).unwrap() {
-        ModelChoice::Terms(kinds) => kinds,
+        ModelChoice::Terms { kinds, .. } => kinds,
         ModelChoice::Auto => vec![],
     };
     assert!(kinds("auto").is_empty());

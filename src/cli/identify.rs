@@ -120,13 +120,19 @@ struct Document<'a> {
     shared_correlation_time: Option<SharedTime>,
 }
 
+fn is_zero(count: &usize) -> bool {
+    *count == 0
+}
+
 /// How the parameters of one axis came about.
 #[derive(Debug, Serialize)]
 struct AxisDocument<'a> {
     name: &'a str,
-    /// Samples used: the longest stretch without gaps and unusable samples.
+    /// Samples from which the parameters are; usable ones of the longest log that had no part in the choice of the terms; samples that were missing and filled in for that.
     samples: usize,
     left_out: usize,
+    #[serde(skip_serializing_if = "is_zero")]
+    filled: usize,
     /// Shortest averaging time that an Allan fit used, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     first_tau_s: Option<f64>,
@@ -177,9 +183,9 @@ struct CurveDocument {
 /// One axis as read and as identified.
 struct Axis {
     measured: AxisCurve,
-    /// On which the terms were chosen, and those of the log that are not among them.
-    samples: usize,
+    /// Samples of the log that are not among those on which the terms were chosen, and how many of these are filled in.
     left_out: usize,
+    filled: usize,
     found: Identified,
     warmth: Option<temperature::Shown>,
 }
@@ -278,6 +284,12 @@ fn whole(args: &Args, choice: &ModelChoice, options: &LogOptions) -> anyhow::Res
         print_check(&recording.name, &check);
         readings.push((recording, check));
     }
+    for (i, (own, _)) in readings.iter().enumerate() {
+        if let Some(same) = readings[..i].iter().position(|(r, _)| r.sha256.is_some() && r.sha256 == own.sha256) {
+            let [own, first] = [i, same].map(|i| args.logs[i].display());
+            bail!("{own}: the same samples as {first}: a log counts once; name logs of different starts");
+        }
+    }
     let (recording, _) = &readings[0];
     let log = Log {
         name: recording.name.clone(),
@@ -354,6 +366,10 @@ fn identify(
     log: &Log,
     warmth: Option<&temperature::Warmth>,
 ) -> anyhow::Result<Axis> {
+    // the integral and the Allan curve want every sample as it was
+    if args.method == MethodArg::Likelihood {
+        parts.iter_mut().for_each(Stretch::bridge);
+    }
     // the first of the longest
     let longest = (0..parts.len()).rev().max_by_key(|i| parts[*i].rate.len()).unwrap_or(0);
     let upsets = upset_words(&parts[longest], dt, args.robust);
@@ -361,7 +377,8 @@ fn identify(
     let (part, method) = (&parts[longest], args.method.method());
     let mut found = if method == Method::Likelihood {
         let logs: Vec<_> = parts.iter().map(Stretch::pieces).collect();
-        identify_logs(&part.name, &part.rate, &logs, dt, &part.unit, choice)?
+        let stretches: Vec<&[f64]> = parts.iter().map(|part| &part.rate[..]).collect();
+        identify_logs(&part.name, &stretches, &logs, dt, &part.unit, choice)?
     } else {
         identify_axis(&part.name, &part.rate, dt, &part.unit, method, choice)?
     };
@@ -379,7 +396,7 @@ fn identify(
     let role = if method == Method::Likelihood { "chooses the terms" } else { "is used" };
     let note = part.left_out_note(role);
     let measured = AxisCurve { name: part.name.clone(), unit: part.unit.clone(), note, curve, fit };
-    Ok(Axis { measured, samples: part.rate.len(), left_out: part.left_out, found, warmth })
+    Ok(Axis { measured, left_out: part.left_out, filled: part.filled, found, warmth })
 }
 
 /// That the noise of the log changes, and what can be done about it.
@@ -462,8 +479,9 @@ fn document<'a>(params: &'a Params, axes: &'a [Axis], log: &'a Log, method: Meth
     };
     let axes = axes.iter().map(|a| AxisDocument {
         name: &a.found.params.name,
-        samples: a.samples,
+        samples: a.found.samples,
         left_out: a.left_out,
+        filled: a.filled,
         first_tau_s: a.found.first_tau_s,
         fit_p_value: a.found.fit_p_value.is_finite().then_some(a.found.fit_p_value),
         candidates: &a.found.candidates,
@@ -537,8 +555,8 @@ fn text(axis: &Axis, quantity: Quantity) -> String {
 
 /// "gyro_x: white+gm, 720000 samples in 2 h".
 fn headline(axis: &Axis) -> String {
-    let Axis { found, .. } = axis;
-    let samples = axis.samples;
+    let found = &axis.found;
+    let samples = found.samples;
     let span = duration(samples as f64 * found.curve.dt);
     match found.candidates.iter().find(|c| c.chosen) {
         Some(chosen) => {

@@ -1,5 +1,5 @@
 //! The part of a log that Allan and spectral methods use: per axis the longest stretch without gaps and unusable
-//! samples, as rate whatever the log holds.
+//! samples, as rate whatever the log holds; or a longer one whose short holes are filled.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::filter;
 use crate::input::InputKind;
-use crate::signal::{Axis, Gap, Recording, upsets};
+use crate::signal::{Axis, Gap, Recording, bridge, upsets};
 use crate::units::Unit;
 
 /// One axis, SI.
@@ -23,13 +23,30 @@ pub(super) struct Stretch {
     pub(super) phase: Option<Vec<f64>>,
     /// Samples of the log outside the stretch.
     pub(super) left_out: usize,
-    /// Where the stretch is in the log.
+    /// How many of `rate` are filled in.
+    pub(super) filled: usize,
+    /// Where the stretch is in the log, or in its pieces laid out with their holes.
     range: Range<usize>,
     /// The whole log: how many samples are missing before, then samples, of which some may not be finite; empty where `rate` is all.
     whole: Vec<(u64, Vec<f64>)>,
 }
 
 impl Stretch {
+    /// Takes a longer stretch, if there is one whose holes are few and short enough to be filled in.
+    pub(super) fn bridge(&mut self) {
+        if self.whole.is_empty() {
+            return;
+        }
+        let Some(found) = bridge::bridge(&laid_out(&self.whole)) else { return };
+        let seen = found.samples.len() - found.filled;
+        let usable = self.whole.iter().flat_map(|(_, own)| own).filter(|v| v.is_finite()).count();
+        self.left_out = usable - seen;
+        self.range = found.start..found.start + found.samples.len();
+        (self.rate, self.filled) = (found.samples, found.filled);
+        // the integral has no values in holes
+        self.phase = None;
+    }
+
     /// Outliers count as missing; how many there are in all. Methods that cannot do without a sample get the median of its surroundings.
     pub(super) fn drop_outliers(&mut self) -> usize {
         if self.whole.is_empty() {
@@ -58,20 +75,38 @@ impl Stretch {
     /// The same in words, if anything is.
     pub(super) fn left_out_note(&self, role: &str) -> Option<String> {
         let (used, left_out) = (self.rate.len(), self.left_out);
-        let note = || {
-            format!("the longest stretch without gaps and unusable samples {role}: {used} samples, {left_out} left out")
+        let note = || match self.filled {
+            0 => format!(
+                "the longest stretch without gaps and unusable samples {role}: {used} samples, {left_out} left out"
+            ),
+            filled => format!(
+                "a stretch with short holes {role}: {used} samples, {filled} of them missing and filled in there with noise as elsewhere in the log, {left_out} left out"
+            ),
         };
-        (left_out > 0).then(note)
+        (left_out + self.filled > 0).then(note)
     }
 
     /// What stands beside the samples of the axis in the log: beside the stretch, and piece by piece as [`Stretch::pieces`].
     pub(super) fn beside(&self, values: &[f64], gaps: &[Gap], kind: InputKind) -> (Vec<f64>, Vec<Vec<f64>>) {
-        let own = beside(values.get(self.range.clone()).unwrap_or_default(), kind);
-        let whole = match self.left_out {
-            0 => vec![own.clone()],
-            _ => pieces(values, gaps, kind, |own| beside(own, kind)).into_iter().map(|(_, own)| own).collect(),
+        if self.whole.is_empty() || (self.left_out == 0 && self.filled == 0) {
+            let own = beside(values.get(self.range.clone()).unwrap_or_default(), kind);
+            return (own.clone(), vec![own]);
+        }
+        let whole = pieces(values, gaps, kind, |own| beside(own, kind));
+        let own = match self.filled {
+            0 => beside(values.get(self.range.clone()).unwrap_or_default(), kind),
+            _ => {
+                let mut own = laid_out(&whole).get(self.range.clone()).unwrap_or_default().to_vec();
+                // straight on over a hole: it is no longer than a hundredth of the log
+                let mut last = own.iter().copied().find(|v| v.is_finite()).unwrap_or(0.0);
+                own.iter_mut().for_each(|v| {
+                    last = if v.is_finite() { *v } else { last };
+                    *v = last;
+                });
+                own
+            }
         };
-        (own, whole)
+        (own, whole.into_iter().map(|(_, own)| own).collect())
     }
 
     /// All of the log, piece by piece.
@@ -108,7 +143,7 @@ fn stretch(name: &str, unit: &Unit, values: Cow<'_, [f64]>, recording: &Recordin
     let phase = (kind == InputKind::Angle).then(|| own.to_vec());
     let unit = if kind == InputKind::Rate { unit.clone() } else { unit.times_time(-2) };
     let rate = if kind == InputKind::Rate && left_out == 0 { values.into_owned() } else { of(own) };
-    Stretch { name: name.to_string(), unit, rate, phase, left_out, range, whole }
+    Stretch { name: name.to_string(), unit, rate, phase, left_out, filled: 0, range, whole }
 }
 
 /// Increments and angles as rate.
@@ -139,6 +174,21 @@ fn pieces(values: &[f64], gaps: &[Gap], kind: InputKind, of: impl Fn(&[f64]) -> 
         (missing, of(own))
     });
     pieces.collect()
+}
+
+/// Pieces one after the other, what is missing between them not a number; a gap that is too long to be filled counts as one that is just that.
+fn laid_out(pieces: &[(u64, Vec<f64>)]) -> Vec<f64> {
+    let samples: usize = pieces.iter().map(|(_, own)| own.len()).sum();
+    // of a log that is as much longer as holes make it
+    let most = bridge::longest_hole(samples) as u64 * 2 + 1;
+    let mut all = Vec::with_capacity(samples);
+    for (missing, own) in pieces {
+        if !all.is_empty() {
+            all.resize(all.len() + (*missing).min(most) as usize, f64::NAN);
+        }
+        all.extend_from_slice(own);
+    }
+    all
 }
 
 /// Longest run of finite values that does not reach over a cut (index of the first sample after it).

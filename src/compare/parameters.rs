@@ -91,7 +91,9 @@ fn of_axis(axis: &AxisParams, log: &LogAxis, dt: f64, display: &Unit) -> Result<
         if estimate.is_none() {
             let fitted = match &own {
                 Some(fitted) => fitted,
-                None => own.insert(kinds.clone().map(|kinds| identify(&ModelChoice::Terms(kinds))).transpose()?),
+                None => own.insert(
+                    kinds.clone().map(|kinds| identify(&ModelChoice::Terms { kinds, average: None })).transpose()?,
+                ),
             };
             estimate = fitted.as_ref().and_then(|fitted| of_path(&file, fitted, &path)).map(|own| Estimate {
                 how: format!("{}, asked for; the log chooses {}", own.how, label(&found)),

@@ -40,7 +40,7 @@ pub(super) fn identify(
     let points = Points::of_curve(&curve, distance);
     let forced = match choice {
         ModelChoice::Auto => None,
-        ModelChoice::Terms(kinds) => Some(Shape::new(kinds.clone())),
+        ModelChoice::Terms { kinds, .. } => Some(Shape::new(kinds.clone())),
     };
     if let Some(kind) = forced.iter().flat_map(Shape::kinds).find(|kind| !in_allan_curve(**kind)) {
         return Err(failed(format!(
@@ -97,6 +97,7 @@ pub(super) fn identify(
         steps: vec![],
         fit_p_value: fit.p_value(),
         first_tau_s: Some(table.points.first_tau_s()),
+        samples: rate.len(),
         curve,
     })
 }
@@ -285,7 +286,7 @@ impl Words<'_> {
                 digits(score(fit)),
                 digits(score(chosen)),
             ),
-            needed_log_s: inside.then_some((LENGTHS_TO_TELL * time).max(2.0 * self.points.span_s())),
+            needed_log_s: inside.then_some((LENGTHS_TO_TELL * time).max(4.0 * self.points.span_s())),
         }
     }
 

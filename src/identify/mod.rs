@@ -56,8 +56,11 @@ impl Method {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ModelChoice {
     Auto,
-    /// `white+gm+gm+rrw+flicker+quantization+ramp`
-    Terms(Vec<Kind>),
+    /// `white+gm+gm+rrw+flicker+quantization+ramp`; over how many samples `ma` averages, if that is said (`ma2`).
+    Terms {
+        kinds: Vec<Kind>,
+        average: Option<u32>,
+    },
 }
 
 /// One candidate of the model choice, for the table that is shown.
@@ -123,6 +126,8 @@ pub struct Identified {
     pub fit_p_value: f64,
     /// Shortest averaging time that an Allan fit used, s.
     pub first_tau_s: Option<f64>,
+    /// From which the parameters are.
+    pub samples: usize,
 }
 
 #[derive(Clone, Debug, thiserror::Error)]
@@ -133,8 +138,8 @@ pub struct IdentifyError {
 
 /// Largest upper/lower ratio of a 95 % interval that still says something.
 const WIDEST_INTERVAL: f64 = 10.0;
-/// A random walk and a Gauss-Markov process differ visibly in a log of this many correlation times.
-const LENGTHS_TO_TELL: f64 = 20.0;
+/// A random walk and a Gauss-Markov process differ in nearly all logs of this many correlation times, in two thirds of those half as long (docs/validation.md).
+const LENGTHS_TO_TELL: f64 = 40.0;
 
 /// Fewest samples from which anything is identified: three averages of ten samples.
 pub const FEWEST_SAMPLES: usize = 30;
@@ -156,23 +161,24 @@ pub fn identify_axis(
         Method::Gmwm => allan_fit::identify(name, rate, dt, display, choice, Distance::Variances),
         Method::Likelihood => {
             let whole = [vec![Stretch { missing: 0, samples: rate }]];
-            likelihood::identify(name, rate, &whole, dt, display, choice)
+            likelihood::identify(name, &[rate], &whole, dt, display, choice)
         }
     }
 }
 
 /// The same by maximum likelihood from logs with gaps, or from several logs of one sensor, each with its own bias.
 ///
-/// `rate` is the longest stretch without gaps, on which the terms are chosen; `logs` are all of them, stretch by stretch.
+/// `stretches`: of each log samples without gaps; on those of them that have the most samples when they are cut to one length the terms are chosen.
+/// `logs` are all samples, stretch by stretch.
 pub fn identify_logs(
     name: &str,
-    rate: &[f64],
+    stretches: &[&[f64]],
     logs: &[Vec<Stretch<'_>>],
     dt: f64,
     display: &Unit,
     choice: &ModelChoice,
 ) -> Result<Identified, IdentifyError> {
-    likelihood::identify(name, rate, logs, dt, display, choice)
+    likelihood::identify(name, stretches, logs, dt, display, choice)
 }
 
 /// Parses `auto` or `white+gm+…`; white noise is part of every model.
@@ -183,10 +189,14 @@ pub fn parse_model(text: &str) -> Result<ModelChoice, IdentifyError> {
     let failed = |message: String| IdentifyError { message: format!("--model {text}: {message}") };
     let known = || shape::KINDS.map(shape::short_name).join(", ");
     let mut kinds = Vec::new();
+    let mut average = None;
     for part in text.split('+').map(str::trim) {
+        let samples = (2..=likelihood::LONGEST_AVERAGE).find(|samples| part == format!("ma{samples}"));
+        average = average.or(samples);
+        let name = if samples.is_some() { "ma" } else { part };
         let kind = shape::KINDS
             .into_iter()
-            .find(|k| part == shape::short_name(*k) || part == shape::document_name(*k))
+            .find(|k| name == shape::short_name(*k) || name == shape::document_name(*k))
             .ok_or_else(|| failed(format!("unknown term '{part}'; known are {} (joined by +), or auto", known())))?;
         if !matches!(kind, Kind::GaussMarkov | Kind::Oscillation) && kinds.contains(&kind) {
             return Err(failed(format!("'{part}' stands twice; only gm and osc may")));
@@ -200,7 +210,7 @@ pub fn parse_model(text: &str) -> Result<ModelChoice, IdentifyError> {
         return Err(failed("white must be part of the model: every sampled sensor has it".into()));
     }
     kinds.sort_unstable();
-    Ok(ModelChoice::Terms(kinds))
+    Ok(ModelChoice::Terms { kinds, average })
 }
 
 /// The samples can be worked with.
@@ -217,7 +227,7 @@ fn usable(name: &str, rate: &[f64]) -> Result<(), IdentifyError> {
     }
     if rate.iter().all(|x| *x == rate[0]) {
         return failed(format!(
-            "constant ({} in SI units, {} samples): a sensor that says the same all the time has no noise to identify; check the column",
+            "constant ({} in SI units, {} samples): a sensor that says the same all the time has no noise to identify; check the column, or name the others with --columns",
             digits(rate[0]),
             rate.len()
         ));

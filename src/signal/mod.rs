@@ -1,5 +1,6 @@
 //! Sampled data: the [`Recording`], its sampling checks, autocorrelation and spectrum (floor 1).
 
+pub mod bridge;
 pub mod check;
 pub mod correlation;
 pub mod cosine;

@@ -16,7 +16,7 @@ fn warming(seconds: f64) -> f64 {
 }
 
 fn fit(logs: &[Vec<Stretch<'_>>], rate: &[f64], model: &str) -> Identified {
-    identify_logs("x", rate, logs, 1.0, &Unit::parse("rad/s").unwrap(), &parse_model(model).unwrap()).unwrap()
+    identify_logs("x", &[rate], logs, 1.0, &Unit::parse("rad/s").unwrap(), &parse_model(model).unwrap()).unwrap()
 }
 
 fn regress(
@@ -355,7 +355,8 @@ fn words_of_the_command() {
     bench.file("b.csv", text("other", |_, t| format!("{t:.3}")));
     let (said, noted) = run("a.csv b.csv", "");
     assert!(noted.contains("the logs do not all have a temperature in degC") && !said.contains("egression"), "{noted}");
-    let (said, _) = run("a.csv a.csv", "");
+    bench.file("c.csv", text("temp_c", |_, t| format!("{:.3}", t + 0.1)));
+    let (said, _) = run("a.csv c.csv", "");
     assert!(said.contains("turn_on_bias.std_dev") || said.contains("the bias follows"), "{said}");
     // other methods do not look for one
     let said = bench.ok("identify a.csv --rate 1 --model white --method allan");

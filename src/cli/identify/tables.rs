@@ -164,7 +164,7 @@ pub(super) fn candidates(candidates: &[Candidate]) -> Option<Shown> {
     } else {
         Shown {
             caption: "Candidates (ln L of the log, and of its last third under what the first two thirds give, against the chosen; score: \
-                      -2 ln L plus a cost for every process, lowest wins)",
+                      -2 ln L plus a cost for every process, lowest wins, unless one within 6 of it foretells that third better by more than 3)",
             header: &["model", "parameters", "ln L", "held out", "score", ""],
             rows,
         }

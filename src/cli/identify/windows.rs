@@ -55,8 +55,8 @@ pub(super) fn axes(
         let (curve, fit) = (identified.curve.clone(), Ok(identified.model.clone()));
         found.push(Axis {
             measured: AxisCurve { name, unit, note: None, curve, fit },
-            samples: count * samples,
             left_out: left_out as usize,
+            filled: 0,
             found: identified,
             warmth: None,
         });

@@ -32,6 +32,8 @@ pub(super) struct Refined {
     pub(super) logs: Vec<f64>,
     /// Diffuse ln L of all logs, SI.
     pub(super) log_likelihood: f64,
+    /// That were seen.
+    pub(super) samples: usize,
     /// Of the logarithms, by second differences; only where there is more than the one stretch that the cosine coefficients saw.
     pub(super) information: Option<DMatrix<f64>>,
     /// Per log.
@@ -121,7 +123,7 @@ impl<'a> Exact<'a> {
     /// likelihood, and what its slopes tell of the difference is added (BFGS: Broyden, Fletcher, Goldfarb, Shanno 1970).
     /// Far away from the maximum that information is taken anew at every place (Fisher 1925, scoring).
     pub(super) fn refine(&self, start: &[f64], bounds: &[(f64, f64)]) -> Option<Refined> {
-        let more = self.samples() as f64 / self.data.samples as f64;
+        let more = self.samples() as f64 * self.data.dt / self.data.total_s();
         let expected = |at: &[f64]| whittle::expected_information(self.data, self.form, at) * more;
         let mut curvature = expected(start);
         let mut sigmas: Vec<f64> = curvature.diagonal().iter().map(|v| 1.0 / v.sqrt()).collect();
@@ -153,8 +155,10 @@ impl<'a> Exact<'a> {
             here = next;
         }
         let Place { at, value, biases, .. } = here;
-        let whole = matches!(self.logs, [log] if matches!(log[..], [Stretch { samples, .. }] if samples.len() == self.data.samples));
+        let seen = self.logs.iter().flatten().flat_map(|part| part.samples).filter(|v| v.is_finite()).count();
+        let whole = matches!(self.logs, [log] if log.len() == 1) && seen == self.data.samples;
         Some(Refined {
+            samples: seen,
             log_likelihood: value,
             information: (!whole).then(|| self.information(&at, value, more)),
             biases,

@@ -18,7 +18,7 @@ use crate::noise::{Kind, Term};
 const MOST_GAUSS_MARKOV: usize = 3;
 const MOST_OSCILLATIONS: usize = 8;
 /// Longest moving average that is tried.
-const LONGEST_AVERAGE: u32 = 4;
+pub(in crate::identify) const LONGEST_AVERAGE: u32 = 4;
 /// Ratio of the correlation times from which a new Gauss-Markov process starts.
 const TIME_RATIO: f64 = 4.0;
 /// Starts that are carried to their maximum.
@@ -79,7 +79,7 @@ type Start = (Form, Vec<f64>, Range<usize>);
 pub(super) fn grow(data: &Ordinates) -> Visited {
     let mut visited = Visited::default();
     let white = Form::new(vec![Piece::White]);
-    let Some(mut best) = whittle::climb_all(data, &white, &[white_level(data)]) else { return visited };
+    let Some(mut best) = whittle::climb_all(data, &white, &[whittle::level(data)]) else { return visited };
     visited.keep(best.clone());
     for _ in 0..ROUNDS {
         let mut moves = additions(data, &best);
@@ -96,7 +96,7 @@ pub(super) fn grow(data: &Ordinates) -> Visited {
 
 /// The maximum of one given form, from many starts.
 pub(super) fn fit(data: &Ordinates, form: &Form) -> Option<Fit> {
-    let mut partial = whittle::climb_all(data, &Form::new(vec![Piece::White]), &[white_level(data)])?;
+    let mut partial = whittle::climb_all(data, &Form::new(vec![Piece::White]), &[whittle::level(data)])?;
     let mut rest: Vec<Piece> = form.pieces().iter().copied().filter(|piece| *piece != Piece::White).collect();
     // wideband pieces first: what is left is drift
     rest.sort_by_key(|piece| std::cmp::Reverse(matches!(piece, Piece::MovingAverage(_) | Piece::Quantization)));
@@ -129,11 +129,6 @@ fn better(data: &Ordinates, visited: &mut Visited, best: &Fit, moves: Vec<Start>
         visited.keep(fit);
     }
     chosen.filter(|fit| score(fit, data) < score(best, data) - 1e-6)
-}
-
-fn white_level(data: &Ordinates) -> f64 {
-    let (power, count) = data.bins.iter().fold((0.0, 0.0), |(p, c), bin| (p + bin.power, c + bin.count));
-    0.5 * (power / f64::max(count, 1.0)).ln()
 }
 
 /// One process more.

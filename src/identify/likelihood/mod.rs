@@ -30,7 +30,7 @@ use super::{
     Candidate, Identified, IdentifyError, LENGTHS_TO_TELL, ModelChoice, Precision as Known, WIDEST_INTERVAL, bias,
     entry, usable,
 };
-use crate::allan::{self, AllanCurve, Deviation, TauGrid};
+use crate::allan::{self, AllanCurve, Deviation, Pooled, TauGrid, deviation};
 use crate::consistency::spectrum::departure;
 use crate::filter::likelihood::Stretch;
 use crate::noise::{Kind, NoiseModel, Term};
@@ -41,6 +41,7 @@ use crate::signal::lines::Line;
 use crate::units::{Unit, digits};
 use exact::{Exact, Refined};
 use form::{Form, Piece};
+pub(super) use growth::LONGEST_AVERAGE;
 use growth::score;
 use interval::{Precision, precisions};
 use names::{name_of, parameter_name, term_name, unit_of};
@@ -61,29 +62,50 @@ const FAST: f64 = 10.0;
 const HELD_OUT: usize = 6;
 /// Standard deviation of a logarithm below which second differences of the exact likelihood give its interval.
 const PARABOLA: f64 = 0.3;
+/// A log with more of its power than this at one frequency is a sinusoid.
+const TONE: f64 = 0.98;
+/// A log so many times as long is nothing to recommend.
+const MOST_LENGTHS: f64 = 100.0;
 /// Share of the log to which the candidates are fitted for that.
 const FITTED_SHARE: f64 = 2.0 / 3.0;
 
-/// `rate`: the longest stretch, on which terms are chosen; `logs`: all of it, for the exact likelihood.
+/// `stretches`: of each log, on which terms are chosen; `logs`: all of it, for the exact likelihood.
 pub(super) fn identify(
     name: &str,
-    rate: &[f64],
+    stretches: &[&[f64]],
     logs: &[Vec<Stretch<'_>>],
     dt: f64,
     display: &Unit,
     choice: &ModelChoice,
 ) -> Result<Identified, IdentifyError> {
+    let rates = same_length(stretches);
+    let rate = rates.first().copied().unwrap_or_default();
     usable(name, rate)?;
     let failed = |message: String| IdentifyError { message: format!("{name}: {message}") };
     let search = || {
-        let data = Ordinates::new(rate, dt, None);
+        let data = Ordinates::of_several(&rates, dt);
         let lines = data.lines.clone();
-        choose(data, choice, &|| Some(thirds(rate, dt, &lines)), logs)
+        choose(data, choice, &|| thirds(&rates, dt, &lines), logs)
     };
-    let (curve, found) =
-        rayon::join(|| allan::curve(rate, dt, Deviation::Oadev, TauGrid::Log(POINTS_PER_DECADE)), search);
+    let allan = || match rates[..] {
+        [rate] => allan::curve(rate, dt, Deviation::Oadev, TauGrid::Log(POINTS_PER_DECADE)),
+        _ => {
+            let mut pooled = Pooled::new(Deviation::Oadev, rate.len(), dt, TauGrid::Log(POINTS_PER_DECADE));
+            rates.iter().try_for_each(|rate| pooled.add(&deviation::phase(rate, dt)))?;
+            Ok(pooled.curve())
+        }
+    };
+    let (curve, found) = rayon::join(allan, search);
     let curve = curve.map_err(|e| failed(e.to_string()))?;
     Whole { name, samples: rate.len(), level: mean(rate), dt, display, choice }.identified(found, curve)
+}
+
+/// Of several stretches those that, cut to one length, have the most samples together: with one length they have the same frequencies.
+fn same_length<'a>(stretches: &[&'a [f64]]) -> Vec<&'a [f64]> {
+    let of = |length: usize| length * stretches.iter().filter(|own| own.len() >= length).count();
+    let lengths = stretches.iter().map(|own| own.len());
+    let Some(length) = lengths.max_by(|a, b| of(*a).cmp(&of(*b)).then(a.cmp(b))) else { return Vec::new() };
+    stretches.iter().filter(|own| own.len() >= length).map(|own| &own[..length]).collect()
 }
 
 /// What is said of the log as a whole.
@@ -104,8 +126,9 @@ impl Whole<'_> {
         let failed = |message: String| IdentifyError { message: format!("{name}: {message}") };
         let forced = *choice != ModelChoice::Auto;
         let Candidates { data, fits, held_out, chosen, refined } = found;
+        let used = data.samples * data.windows as usize;
         let (Some((on_cosines, _)), Some((fitted, refined))) = (fits.get(chosen), refined) else {
-            let line = matches!(choice, ModelChoice::Terms(kinds) if kinds.contains(&Kind::Oscillation));
+            let line = matches!(choice, ModelChoice::Terms { kinds, .. } if kinds.contains(&Kind::Oscillation));
             return Err(failed(if line {
                 "no line stands out of the spectrum: leave osc out of --model".into()
             } else {
@@ -120,6 +143,7 @@ impl Whole<'_> {
         let model = NoiseModel { terms: terms.iter().map(|found| found.term).collect() };
         curve.refine(&model);
         let mut not_identified = words.unknown_parameters(fit, known);
+        not_identified.extend(words.open_lines(fit, known));
         if !forced {
             if let Some((best, of_best)) = fits.first().filter(|_| chosen > 0) {
                 not_identified.extend(words.unknown_parameters(best, of_best));
@@ -137,13 +161,22 @@ impl Whole<'_> {
             log_likelihood: Some(fit.log_likelihood),
             held_out: held_out.get(i).copied().flatten(),
             score: score(fit, &data),
-            identified: unknown(&data, fit, known).is_empty(),
+            identified: told(&data, fit, known),
             chosen: i == chosen,
         };
         let candidates = fits.iter().enumerate().map(candidate).collect();
         let (bias, turn_on_bias) = match refined.as_ref().and_then(|refined| turn_on::spread(&refined.biases)) {
             Some(spread) => spread.measured(display),
-            None => (bias(level, samples, dt, &model, display), None),
+            None => {
+                // drift that is not told apart is there all the same
+                let slopes = model.terms.iter().filter(|term| term.kind() == Kind::RateRamp).copied();
+                let pieces = fit
+                    .form
+                    .split(&fit.logs)
+                    .filter_map(|(piece, own)| piece.term(&own.iter().map(|v| v.exp()).collect::<Vec<f64>>()));
+                let every = NoiseModel { terms: pieces.chain(slopes).collect() };
+                (bias(level, samples, dt, &every, display), None)
+            }
         };
         Ok(Identified {
             params: AxisParams {
@@ -161,6 +194,7 @@ impl Whole<'_> {
             time_profile: shared::TimeProfile::new(&data, on_cosines),
             fitted: Some(fitted.clone()),
             sums,
+            samples: refined.as_ref().map_or(used, |refined| refined.samples),
             // of the parameters that are written, not of others
             exact_log_likelihood: refined.filter(|_| all_known).map(|refined| refined.log_likelihood),
             warnings: words.warnings(fit, fit_p_value),
@@ -208,7 +242,7 @@ fn choose(
             Candidates { data, fits, held_out, chosen, refined }
         }
         // what is held out chooses nothing
-        ModelChoice::Terms(_) => {
+        ModelChoice::Terms { .. } => {
             let fits = fits(&data, choice);
             let (refined, held_out) = rayon::join(|| refined(&fits, 0), || held_out(parts(), &fits));
             Candidates { data, fits, held_out, chosen: 0, refined }
@@ -220,7 +254,9 @@ fn choose(
 fn fits(data: &Ordinates, choice: &ModelChoice) -> Vec<(Fit, Vec<Precision>)> {
     let fits: Vec<Fit> = match choice {
         ModelChoice::Auto => growth::grow(data).ranked(data).into_iter().take(LOOKED_AT).cloned().collect(),
-        ModelChoice::Terms(kinds) => forms(kinds).par_iter().filter_map(|form| growth::fit(data, form)).collect(),
+        ModelChoice::Terms { kinds, average } => {
+            forms(kinds, *average).par_iter().filter_map(|form| growth::fit(data, form)).collect()
+        }
     };
     let known = |fit| {
         let known = precisions(data, &fit);
@@ -228,7 +264,7 @@ fn fits(data: &Ordinates, choice: &ModelChoice) -> Vec<(Fit, Vec<Precision>)> {
     };
     let mut fits: Vec<(Fit, Vec<Precision>)> = fits.into_par_iter().map(known).collect();
     fits.sort_by(|a, b| score(&a.0, data).total_cmp(&score(&b.0, data)));
-    if *choice == ModelChoice::Auto && fits.iter().all(|(fit, known)| !unknown(data, fit, known).is_empty()) {
+    if *choice == ModelChoice::Auto && fits.iter().all(|(fit, known)| !told(data, fit, known)) {
         fits.extend(fits.first().and_then(|best| reduced(data, best)));
     }
     fits
@@ -255,6 +291,14 @@ fn refine(
     let bounds = whittle::bounds(data, &start.form, &start.logs);
     let exact = Exact::new(data, &start.form, &start.logs, logs).filter(|_| !logs.is_empty());
     let refined = exact.and_then(|exact| exact.refine(&start.logs, &bounds));
+    // a steady tone is no oscillation of any width that is searched: there the two likelihoods differ by more than either knows
+    let apart = |refined: &Refined| {
+        let outside = |(to, old): (&f64, &Precision)| {
+            old.lower.is_some_and(|low| *to < low) || old.upper.is_some_and(|high| *to > high)
+        };
+        refined.information.is_none() && refined.logs.iter().zip(known).any(outside)
+    };
+    let refined = refined.filter(|refined| !apart(refined));
     let lines = data.lines.clone();
     let fitted = match &refined {
         Some(refined) => Fitted {
@@ -277,7 +321,7 @@ fn moved(
     logs: &[Vec<Stretch<'_>>],
 ) -> Vec<Precision> {
     let samples: usize = logs.iter().flatten().map(|part| part.samples.len()).sum();
-    let more = samples as f64 / data.samples as f64;
+    let more = samples as f64 * data.dt / data.total_s();
     let sigmas = refined.information.clone().map(interval::deviations);
     let of = |(i, old): (usize, &Precision)| {
         let (from, to) = (before.logs[i], refined.logs[i]);
@@ -287,16 +331,16 @@ fn moved(
         let limit = |old: Option<f64>, side: f64| match old {
             _ if sigmas.is_some() && sigma < PARABOLA => Some(to + side * NORMAL_95 * sigma),
             old if parabola => old.map(|old| to + (old - from) * shrunk),
-            // where the likelihood is flat its maximum moves far, its limits do not
-            old => old,
+            // where the likelihood is flat its maximum moves far, its limits do not; one that it has passed is none
+            old => old.filter(|old| side * (old - to) > 0.0),
         };
         Precision { sigma, bound: old.bound / more.sqrt(), lower: limit(old.lower, -1.0), upper: limit(old.upper, 1.0) }
     };
     known.iter().enumerate().map(of).collect()
 }
 
-/// The forms that a list of kinds may mean: the length of a moving average is open.
-fn forms(kinds: &[Kind]) -> Vec<Form> {
+/// The forms that a list of kinds may mean: the length of a moving average may be open.
+fn forms(kinds: &[Kind], average: Option<u32>) -> Vec<Form> {
     let with_average = |samples: u32| {
         let piece = |kind: &Kind| match kind {
             Kind::White => Piece::White,
@@ -310,7 +354,10 @@ fn forms(kinds: &[Kind]) -> Vec<Form> {
         };
         Form::new(kinds.iter().map(piece).collect())
     };
-    let mut all: Vec<Form> = (2..=4).map(with_average).collect();
+    let mut all: Vec<Form> = match average {
+        Some(samples) => vec![with_average(samples)],
+        None => (2..=LONGEST_AVERAGE).map(with_average).collect(),
+    };
     all.dedup();
     all
 }
@@ -325,6 +372,12 @@ fn unknown(data: &Ordinates, fit: &Fit, known: &[Precision]) -> Vec<usize> {
     };
     let drift = |i: &usize| fit.form.pieces()[roles[*i].0].kind().is_drift() && !fast(*i);
     wide(known).into_iter().filter(drift).collect()
+}
+
+/// Every drift parameter has an interval that says something; that of a slope does not hold zero.
+fn told(data: &Ordinates, fit: &Fit, known: &[Precision]) -> bool {
+    let sloped = || fit.slope.abs() > NORMAL_95 * whittle::slope_sigma(data, &fit.form, &fit.logs);
+    unknown(data, fit, known).is_empty() && (!fit.form.has(Kind::RateRamp) || sloped())
 }
 
 /// The best fit without the drift processes that its log does not tell, their parameters found anew.
@@ -420,7 +473,7 @@ fn goodness(data: &Ordinates, fit: &Fit) -> f64 {
 /// The best score among models whose parameters are known; a model that is close in score takes its place when it foretells the last third of the log
 /// clearly better.
 fn choice_of(data: &Ordinates, fits: &[(Fit, Vec<Precision>)], held_out: &[Option<f64>]) -> usize {
-    let identified = |i: &usize| unknown(data, &fits[*i].0, &fits[*i].1).is_empty();
+    let identified = |i: &usize| told(data, &fits[*i].0, &fits[*i].1);
     let Some(first) = (0..fits.len()).find(identified) else { return 0 };
     let foretold = |i: usize| held_out.get(i).copied().flatten();
     let Some(known) = foretold(first) else { return first };
@@ -433,10 +486,16 @@ fn choice_of(data: &Ordinates, fits: &[(Fit, Vec<Precision>)], held_out: &[Optio
         .map_or(first, |(i, _)| i)
 }
 
-/// The first two thirds of the log, and the last.
-fn thirds(rate: &[f64], dt: f64, lines: &[Line]) -> [Ordinates; 2] {
-    let (early, late) = rate.split_at((rate.len() as f64 * FITTED_SHARE) as usize);
-    [early, late].map(|part| Ordinates::new(part, dt, Some(lines)))
+/// The first two thirds of each log, and the last.
+fn thirds(rates: &[&[f64]], dt: f64, lines: &[Line]) -> Option<[Ordinates; 2]> {
+    let of = |late: bool| {
+        let part = |rate: &&[f64]| {
+            let (early, after) = rate.split_at((rate.len() as f64 * FITTED_SHARE) as usize);
+            Ordinates::new(if late { after } else { early }, dt, Some(lines))
+        };
+        Ordinates::pooled(&rates.iter().map(part).collect::<Vec<_>>())
+    };
+    Some([of(false)?, of(true)?])
 }
 
 /// ln L of the last third of the log under the parameters that the first two thirds give, by candidate.
@@ -466,6 +525,17 @@ impl Words<'_> {
         wide(known).into_iter().filter(line).map(|i| self.not_identified(fit, i, &known[i])).collect()
     }
 
+    /// Lines as narrow as the log is long: how long their correlation times are at least.
+    fn open_lines(&self, fit: &Fit, known: &[Precision]) -> Vec<NotIdentified> {
+        let roles = fit.form.roles();
+        let time = |i: &usize| {
+            let (piece, role) = roles[*i];
+            fit.form.pieces()[piece] == Piece::Oscillation && role == Role::CorrelationTime
+        };
+        let open = |i: &usize| known[*i].lower.is_some() && known[*i].upper.is_none();
+        (0..roles.len()).filter(time).filter(open).map(|i| self.not_identified(fit, i, &known[i])).collect()
+    }
+
     fn not_identified(&self, fit: &Fit, index: usize, known: &Precision) -> NotIdentified {
         let span = digits(self.data.total_s());
         let value = |log: f64| self.shown(fit, index, log);
@@ -480,7 +550,8 @@ impl Words<'_> {
         NotIdentified {
             term: name_of(&fit.form, index),
             reason: format!("{reason}, model {}", fit.form.label()),
-            needed_log_s: (needed.is_finite() && needed > self.data.total_s()).then_some(needed),
+            needed_log_s: (needed > self.data.total_s() && needed < MOST_LENGTHS * self.data.total_s())
+                .then_some(needed),
         }
     }
 
@@ -523,7 +594,7 @@ impl Words<'_> {
                     fit.form.label(),
                     own.form.label(),
                 ),
-                needed_log_s: estimate.map(|time| (LENGTHS_TO_TELL * time).max(2.0 * self.data.total_s())),
+                needed_log_s: estimate.map(|time| (LENGTHS_TO_TELL * time).max(4.0 * self.data.total_s())),
             });
         }
         found
@@ -549,9 +620,11 @@ impl Words<'_> {
     /// Density of a random walk that lowers ln L by χ²₁(0.90)/2.
     fn largest_walk(&self, fit: &Fit) -> Option<f64> {
         let touch = whittle::touching(self.data, &Term::RateRandomWalk { density: 1.0 });
+        // the last step of the search was on another likelihood
+        let without = whittle::log_likelihood(self.data, &fit.form, &fit.logs);
         let fall = |log: f64| {
             let (form, logs, _) = fit.form.with(&fit.logs, Piece::RandomWalk, &[log]);
-            2.0 * (fit.log_likelihood - whittle::log_likelihood(self.data, &form, &logs)) - 2.706
+            2.0 * (without - whittle::log_likelihood(self.data, &form, &logs)) - 2.706
         };
         let (mut low, mut high) = (touch - 9.0, touch + 6.0);
         if fall(high).is_nan() || fall(high) <= 0.0 {
@@ -570,6 +643,13 @@ impl Words<'_> {
             warnings.push(format!(
                 "the search for the maximum has not converged (another step would gain {} in ln L)",
                 digits(0.5 * fit.decrement)
+            ));
+        }
+        if let Some((frequency, share)) = self.data.tone().filter(|(_, share)| *share > TONE) {
+            warnings.push(format!(
+                "{} % of the power is at {} Hz: a sinusoid, not noise; is the sensor at rest?",
+                digits(100.0 * share),
+                digits(frequency)
             ));
         }
         if p_value < FIT_LEVEL {

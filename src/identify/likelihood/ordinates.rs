@@ -82,6 +82,22 @@ impl Ordinates {
         Ordinates { bins, grid, lines, samples: n, windows: 1.0, dt }
     }
 
+    /// Stretches of one length, with the lines that stand out of any of them.
+    pub(super) fn of_several(rates: &[&[f64]], dt: f64) -> Ordinates {
+        let alone: Vec<Ordinates> = rates.par_iter().map(|rate| Ordinates::new(rate, dt, None)).collect();
+        let mut lines: Vec<Line> = alone.iter().flat_map(|own| own.lines.iter().copied()).collect();
+        lines.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+        lines.dedup_by(|b, a| b.frequency_hz - a.frequency_hz < a.width_hz.max(b.width_hz));
+        let again = |(rate, own): (&&[f64], Ordinates)| match own.lines == lines {
+            true => own,
+            false => Ordinates::new(rate, dt, Some(&lines)),
+        };
+        let mut all = rates.par_iter().zip(alone).map(again).collect::<Vec<_>>().into_iter();
+        let mut pooled = all.next().unwrap_or_else(|| Ordinates::new(&[], dt, None));
+        all.for_each(|own| pooled.add(&own));
+        pooled
+    }
+
     /// Windows of the same length and lines taken together; `None` of none.
     pub(super) fn pooled(windows: &[Ordinates]) -> Option<Ordinates> {
         let (first, others) = windows.split_first()?;
@@ -135,6 +151,20 @@ impl Ordinates {
         let last = (at..self.bins.len()).take_while(|i| self.bins[*i].count <= most).last().unwrap_or(at);
         let (low, high) = (self.bins[first].frequency_hz, self.bins[last].frequency_hz);
         (low.min(frequency_hz), high.max(frequency_hz), self.bins[at].count / self.windows * step)
+    }
+
+    /// The frequency with most power among those above the coefficients that stand alone, and the share of all power there: within 32 coefficients, beyond which a
+    /// sinusoid has less than 1 % of its own.
+    pub(super) fn tone(&self) -> Option<(f64, f64)> {
+        let step = 1.0 / (2.0 * self.span_s());
+        let density = |bin: &&Bin| bin.power / bin.count;
+        let fast = |bin: &&Bin| bin.frequency_hz > ALONE as f64 * step;
+        let top = self.bins.iter().filter(fast).max_by(|a, b| density(a).total_cmp(&density(b)))?.frequency_hz;
+        let near = |bin: &&Bin| (bin.frequency_hz - top).abs() <= ALONE as f64 * step + 0.5 * bin.count * step;
+        let all: f64 = self.bins.iter().map(|bin| bin.power).sum();
+        let own =
+            self.bins.iter().filter(near).fold((0.0, 0.0), |(p, f), b| (p + b.power, f + b.power * b.frequency_hz));
+        Some((own.1 / own.0, own.0 / all))
     }
 
     /// Length of the log, or of each of its windows, s.

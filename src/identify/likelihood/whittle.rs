@@ -232,10 +232,18 @@ pub(super) fn bounds(data: &Ordinates, form: &Form, start: &[f64]) -> Vec<(f64, 
             }
             Piece::GaussMarkov => vec![coefficient, (shortest_drift, (LONGEST * data.span_s()).ln())],
             Piece::Ramp => vec![],
+            // as far as all power together
+            Piece::White => vec![(coefficient.0, coefficient.1.max(level(data) + 1.0))],
             _ => vec![coefficient],
         }
     };
     form.split(start).flat_map(of).collect()
+}
+
+/// ln of the density of white noise with the power of the log.
+pub(super) fn level(data: &Ordinates) -> f64 {
+    let (power, count) = data.bins.iter().fold((0.0, 0.0), |(p, c), bin| (p + bin.power, c + bin.count));
+    0.5 * (power / f64::max(count, 1.0)).ln()
 }
 
 /// ln of the coefficient with which a process alone touches the spectrum from below, for its extreme correlation times.

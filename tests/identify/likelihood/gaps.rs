@@ -6,9 +6,9 @@ use kfdesign::identify::identify_logs;
 use super::*;
 use crate::support::Bench;
 
-fn together(logs: &[Vec<Stretch<'_>>], longest: &[f64], model: &str) -> Identified {
+fn together(logs: &[Vec<Stretch<'_>>], stretches: &[&[f64]], model: &str) -> Identified {
     let choice = parse_model(model).unwrap();
-    identify_logs("x", longest, logs, 1.0, &Unit::parse("rad/s").unwrap(), &choice).unwrap()
+    identify_logs("x", stretches, logs, 1.0, &Unit::parse("rad/s").unwrap(), &choice).unwrap()
 }
 
 /// Ten hours at 1 Hz, of which three gaps take a tenth, and one sample is not a number. What the stretches say together is known as
@@ -25,7 +25,7 @@ fn gaps_cost_no_more_than_what_is_missing() {
             .map(|(missing, range)| Stretch { missing, samples: &rate[range] })
             .collect();
     let longest = &rate[..9000];
-    let found = together(&[pieces], longest, "white+gm");
+    let found = together(&[pieces], &[longest], "white+gm");
     let estimate = ln_estimate(&found).unwrap();
     let expected = bound(N, SIGMA, TC, 32_400, 1.0);
     let truth = [N.ln(), SIGMA.ln(), TC.ln()];
@@ -55,7 +55,7 @@ fn repeated_starts_give_the_turn_on_bias() {
     let of = |i: usize| log(&[white(0.05)], 3600, 1.0, 7, i as u64).iter().map(|x| x + starts[i]).collect::<Vec<f64>>();
     let all: Vec<Vec<f64>> = (0..12).map(of).collect();
     let logs: Vec<Vec<Stretch<'_>>> = all.iter().map(|x| vec![Stretch { missing: 0, samples: x }]).collect();
-    let found = together(&logs, &all[0], "white");
+    let found = together(&logs, &[&all[0]], "white");
     let mean = starts.iter().sum::<f64>() / 12.0;
     let spread = (starts.iter().map(|b| (b - mean).powi(2)).sum::<f64>() / 11.0).sqrt();
     let bias = found.params.bias.unwrap();
@@ -69,8 +69,77 @@ fn repeated_starts_give_the_turn_on_bias() {
     // equal biases: no spread is claimed
     let same: Vec<Vec<Stretch<'_>>> =
         all.iter().take(1).cycle().take(3).map(|x| vec![Stretch { missing: 0, samples: x }]).collect();
-    let none = together(&same, &all[0], "white").params.turn_on_bias;
+    let none = together(&same, &[&all[0]], "white").params.turn_on_bias;
     assert!(none.is_none_or(|spread| spread.interval_si().unwrap()[0] == 0.0));
+}
+
+/// Five starts of half an hour: the terms are chosen on all of them. What one log alone does not tell (each has nine correlation times) is told by all five, in any order of the
+/// logs, a short one among them or not: the search may end elsewhere by a thousandth of a standard deviation.
+#[test]
+fn terms_are_chosen_on_all_logs() {
+    let of = |run: u64| log(&[white(N), gauss_markov(SIGMA, TC)], 1800, 1.0, 14, run);
+    let all: Vec<Vec<f64>> = (0..5).map(of).chain([of(5)[..100].to_vec()]).collect();
+    let found = |order: &[usize]| {
+        let logs: Vec<Vec<Stretch<'_>>> =
+            order.iter().map(|i| vec![Stretch { missing: 0, samples: &all[*i] }]).collect();
+        let stretches: Vec<&[f64]> = order.iter().map(|i| &all[*i][..]).collect();
+        together(&logs, &stretches, "auto")
+    };
+    let first = found(&[0, 1, 2, 3, 4, 5]);
+    assert_eq!((label(&first.model).as_str(), first.samples), ("GaussMarkov+White", 9100));
+    let alone = (0..5).filter(|i| label(&found(&[*i]).model) == "GaussMarkov+White").count();
+    assert!(alone < 3, "{alone} logs tell by themselves: nothing is shown");
+    let estimate = ln_estimate(&first).unwrap();
+    for order in [[5, 4, 3, 2, 1, 0], [2, 5, 0, 4, 1, 3]] {
+        let other = found(&order);
+        let names = |found: &Identified| found.candidates.iter().map(|c| c.model.clone()).collect::<Vec<_>>();
+        assert_eq!(names(&other), names(&first));
+        for (i, precision) in other.precision.iter().enumerate() {
+            let moved = ln_estimate(&other).unwrap()[i] - estimate[i];
+            assert!(moved.abs() < 1e-3 * 0.01 * precision.std_dev_percent, "{}: {moved}", precision.parameter);
+        }
+    }
+    // the mean interval of one log of this length is half as wide again as that of all: counts of the bound
+    let alone = bound(N, SIGMA, TC, 9100, 1.0);
+    for (precision, bound) in first.precision.iter().zip(alone) {
+        assert!((0.01 * precision.cramer_rao_percent / bound - 1.0).abs() < 0.5, "{}", precision.parameter);
+    }
+}
+
+/// Two hours at 10 Hz of which two samples in a hundred are not a number, twelve rows of a hundred are not there, one gap of ten minutes begins the last quarter: the terms are
+/// those of the whole log, and each parameter is within 4.5 standard deviations of what 12 % of the samples more can move it by (√(2 · 0.12) of its own; 2e-5 for the three).
+/// Cut at its holes, the longest part would be of a minute.
+#[test]
+fn holes_take_no_terms_away() {
+    let bench = Bench::new();
+    let rate = log(&[white(N), gauss_markov(SIGMA, TC)], 72_000, 0.1, 15, 0);
+    let row = |k: usize, value: f64| format!("{:.1},{value:.6}\n", 0.1 * k as f64);
+    let header = "time (s),gyro_x (deg/s)\n";
+    bench.file("whole.csv", header.to_string() + &(0..72_000).map(|k| row(k, rate[k])).collect::<String>());
+    let there = |k: &usize| !(k % 6000 < 100 && *k > 100) && !(54_000..60_000).contains(k);
+    let holed = |k: usize| if k % 50 == 17 { format!("{:.1},nan\n", 0.1 * k as f64) } else { row(k, rate[k]) };
+    bench.file("holed.csv", header.to_string() + &(0..72_000).filter(there).map(holed).collect::<String>());
+    let found = |name: &str| {
+        let out = bench.run(&format!("identify {name} --json"));
+        assert_eq!(out.status, 0, "{}", out.stderr);
+        let document: serde_json::Value = serde_json::from_str(&out.stdout).unwrap();
+        (document["params"]["axes"][0].clone(), document["axes"][0].clone())
+    };
+    let ((whole, of_whole), (holed, of_holed)) = (found("whole.csv"), found("holed.csv"));
+    let paths = ["/white/density", "/gauss_markov/0/std_dev", "/gauss_markov/0/correlation_time"];
+    for (i, path) in paths.iter().enumerate() {
+        let value =
+            |axis: &serde_json::Value| axis.pointer(&format!("{path}/value")).and_then(|v| v.as_f64()).expect(path);
+        let sd = 0.01 * of_whole["precision"][i]["std_dev_percent"].as_f64().unwrap();
+        let moved = (value(&holed) / value(&whole)).ln();
+        assert!(moved.abs() < 4.5 * (2.0 * 0.12_f64).sqrt() * sd, "{path}: {moved}, sd {sd}");
+    }
+    let count = |name: &str| of_holed[name].as_u64().unwrap_or(0);
+    let finite = (0..72_000).filter(there).filter(|k| k % 50 != 17).count() as u64;
+    assert_eq!(count("samples"), finite);
+    // the gap is too long to be filled: what comes after it takes no part in the choice
+    let before = (0..54_000).filter(there).filter(|k| k % 50 != 17).count() as u64;
+    assert_eq!((count("filled"), count("left_out")), (54_000 - before, finite - before));
 }
 
 #[test]
@@ -94,6 +163,7 @@ fn several_logs_on_the_command_line() {
         ("identify a.csv accel.csv --rate 100", "accel.csv: quantity"),
         ("identify a.csv b.csv --rate 100 --method allan", "2 logs: only --method likelihood takes more than one"),
         ("identify a.csv b.csv --rate 100 -o b.csv", "b.csv: cannot write: it is the input file"),
+        ("identify a.csv b.csv a.csv --rate 100", "a.csv: the same samples as a.csv: a log counts once"),
         ("identify", "LOG"),
     ] {
         let out = bench.run(arguments);

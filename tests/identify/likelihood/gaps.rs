@@ -106,6 +106,29 @@ fn terms_are_chosen_on_all_logs() {
     }
 }
 
+/// A line of one start and another line of the other: both are looked for in both. Lines of 30 s of correlation time are 0.01 Hz wide; a frequency is known to a tenth of that.
+#[test]
+fn lines_of_every_log_are_found() {
+    let of = |run: u64, frequency_hz: f64| {
+        let line = Term::Oscillation { std_dev: 0.2, frequency_hz, correlation_time: 30.0 };
+        log(&[white(0.1), line], 3000, 1.0, 16, run)
+    };
+    let all = [of(0, 0.11), of(1, 0.37)];
+    let logs: Vec<Vec<Stretch<'_>>> = all.iter().map(|x| vec![Stretch { missing: 0, samples: x }]).collect();
+    let found = together(&logs, &[&all[0], &all[1]], "white+osc+osc");
+    let mut lines: Vec<f64> = found
+        .model
+        .terms
+        .iter()
+        .filter_map(|term| match term {
+            Term::Oscillation { frequency_hz, .. } => Some(*frequency_hz),
+            _ => None,
+        })
+        .collect();
+    lines.sort_by(f64::total_cmp);
+    assert!(lines.len() == 2 && (lines[0] - 0.11).abs() < 0.003 && (lines[1] - 0.37).abs() < 0.003, "{lines:?}");
+}
+
 /// Two hours at 10 Hz of which two samples in a hundred are not a number, twelve rows of a hundred are not there, one gap of ten minutes begins the last quarter: the terms are
 /// those of the whole log, and each parameter is within 4.5 standard deviations of what 12 % of the samples more can move it by (√(2 · 0.12) of its own; 2e-5 for the three).
 /// Cut at its holes, the longest part would be of a minute.

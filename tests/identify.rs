@@ -328,6 +328,17 @@ fn precision_is_said_with_the_length_that_would_sharpen_it() {
     assert!((hours / expected - 1.0).abs() < 1e-3, "{sentence}, {expected}");
 }
 
+/// One log of the reference sensor in about two thousand has a p-value below 10⁻³ by chance (here 6.6e-4): nothing is left out for that, and N is known as in any other log.
+#[test]
+fn a_poor_fit_by_chance_leaves_no_short_averages_out() {
+    let rate = log(&[white(N), gauss_markov(SIGMA, TC)], 7200, 1.0, 35, 253);
+    let found = identify(&rate, 1.0, &parse_model("white+gm").unwrap());
+    assert!((1e-4..1e-3).contains(&found.fit_p_value), "{}", found.fit_p_value);
+    assert_eq!(found.first_tau_s, Some(1.0));
+    // 4.5 times the bound of ln N
+    assert!((found.model.white_density() / N).ln().abs() < 4.5 * 0.0086, "{}", found.model.white_density());
+}
+
 /// A sensor whose samples are averaged in pairs (lag-one correlation 1/2): the shortest averaging times are left out, and the
 /// density stays right. |z| < 6 and the p-value as above.
 #[test]

@@ -37,7 +37,7 @@ impl Stretch {
         if self.whole.is_empty() {
             return;
         }
-        let Some(found) = bridge::bridge(&laid_out(&self.whole)) else { return };
+        let Some(found) = laid_out(&self.whole).and_then(|all| bridge::bridge(&all)) else { return };
         let seen = found.samples.len() - found.filled;
         let usable = self.whole.iter().flat_map(|(_, own)| own).filter(|v| v.is_finite()).count();
         self.left_out = usable - seen;
@@ -96,7 +96,7 @@ impl Stretch {
         let own = match self.filled {
             0 => beside(values.get(self.range.clone()).unwrap_or_default(), kind),
             _ => {
-                let mut own = laid_out(&whole).get(self.range.clone()).unwrap_or_default().to_vec();
+                let mut own = laid_out(&whole).unwrap_or_default().get(self.range.clone()).unwrap_or_default().to_vec();
                 // straight on over a hole: it is no longer than a hundredth of the log
                 let mut last = own.iter().copied().find(|v| v.is_finite()).unwrap_or(0.0);
                 own.iter_mut().for_each(|v| {
@@ -176,19 +176,24 @@ fn pieces(values: &[f64], gaps: &[Gap], kind: InputKind, of: impl Fn(&[f64]) -> 
     pieces.collect()
 }
 
-/// Pieces one after the other, what is missing between them not a number; a gap that is too long to be filled counts as one that is just that.
-fn laid_out(pieces: &[(u64, Vec<f64>)]) -> Vec<f64> {
+/// Pieces one after the other, what is missing between them not a number; a gap that is too long to be filled counts as one that is just that. `None` where that would be more
+/// than is there: bursts, each for itself.
+fn laid_out(pieces: &[(u64, Vec<f64>)]) -> Option<Vec<f64>> {
     let samples: usize = pieces.iter().map(|(_, own)| own.len()).sum();
     // of a log that is as much longer as holes make it
     let most = bridge::longest_hole(samples) as u64 * 2 + 1;
-    let mut all = Vec::with_capacity(samples);
+    let missing: usize = pieces.iter().map(|(missing, _)| (*missing).min(most) as usize).sum();
+    if missing > samples {
+        return None;
+    }
+    let mut all = Vec::with_capacity(samples + missing);
     for (missing, own) in pieces {
         if !all.is_empty() {
             all.resize(all.len() + (*missing).min(most) as usize, f64::NAN);
         }
         all.extend_from_slice(own);
     }
-    all
+    Some(all)
 }
 
 /// Longest run of finite values that does not reach over a cut (index of the first sample after it).
@@ -233,6 +238,17 @@ mod tests {
             pieces(&values, &gaps, kind, |own| beside(own, kind)),
             [(0, vec![2.0]), (8, vec![]), (2, vec![8.5])]
         );
+    }
+
+    /// Holes up to as long as the log itself; a long gap counts as a fiftieth of the log.
+    #[test]
+    fn bursts_are_not_laid_out() {
+        let bursts = |count: usize, missing: u64| vec![(missing, vec![1.0; 100]); count];
+        assert_eq!(laid_out(&bursts(100, u64::MAX)), None);
+        assert_eq!(laid_out(&bursts(10, 90)).unwrap().len(), 10 * 100 + 9 * 21);
+        let all = laid_out(&bursts(40, 3)).unwrap();
+        assert_eq!((all.len(), all.iter().filter(|v| v.is_nan()).count()), (4117, 117));
+        assert!(all[100..103].iter().all(|v| v.is_nan()) && all[103] == 1.0);
     }
 
     #[test]

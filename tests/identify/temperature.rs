@@ -291,6 +291,21 @@ fn columns_and_units() {
     assert_eq!(found["column"], "gyro_temp");
     assert!((found["missing"].as_f64().unwrap() - 1.0 / 3.0).abs() < 1e-9);
     assert!((value(&document) / value(&celsius) - 1.0).abs() < 0.01);
+    // every fiftieth sample not a number, two rows of a hundred missing: the temperature stands beside what is filled in
+    let rows: String = log(&[white(N)], 3000, 1.0, 97, 0)
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| i % 700 != 300 && i % 700 != 301)
+        .map(|(i, z)| {
+            let t = 20.0 + warming(i as f64);
+            let z = if i % 50 == 7 { f64::NAN } else { z + 0.05 * t };
+            format!("{i},{z:.6},{t:.3}\n")
+        })
+        .collect();
+    bench.file("holes.csv", format!("t_s,gyro_x (deg/s),temp_c\n{rows}"));
+    let document: Value = serde_json::from_str(&bench.ok("identify holes.csv --model white --json")).unwrap();
+    assert_eq!(document["axes"][0]["filled"], 60 + 8);
+    assert!((value(&document) - 0.05).abs() < 0.003, "{}", value(&document));
     // an angle, and a gap in the time stamps
     let mut sum = 0.0;
     let rows: String = log(&[white(N)], 3000, 1.0, 98, 0)

@@ -222,11 +222,7 @@ fn learn(curvature: &mut DMatrix<f64>, from: &Place, to: &Place) {
 
 /// The filter model of a form at these logarithms; `span_s`: length of the log.
 pub(super) fn model(form: &Form, logs: &[f64], dt: f64, span_s: f64) -> Option<LinearModel> {
-    let terms = form.split(logs).filter_map(|(piece, own)| {
-        let values: Vec<f64> = own.iter().map(|v| v.exp()).collect();
-        piece.term(&values)
-    });
-    let noise = NoiseModel { terms: terms.collect() };
+    let noise = NoiseModel { terms: form.terms(logs).collect() };
     // a model needs a state: for white noise alone one that is zero
     let zero = Some(InitialBias { mean: 0.0, std_dev: 0.0 });
     // the quantity names units, no numbers

@@ -14,7 +14,7 @@ use serde::Serialize;
 use super::form::Form;
 use super::names::{name_of, unit_of};
 use super::ordinates::Ordinates;
-use super::sums::{counts_as_white, terms};
+use super::sums::counts_as_white;
 use super::whittle;
 use crate::identify::FEWEST_SAMPLES;
 use crate::noise::{Kind, NoiseModel, Term};
@@ -83,7 +83,7 @@ impl Follower {
 
     /// Where the spectrum must be seen finely: lines as designed and as they are.
     fn lines(&self) -> Vec<Line> {
-        let both = [&self.design, &self.now].into_iter().flat_map(|logs| terms(&self.form, logs));
+        let both = [&self.design, &self.now].into_iter().flat_map(|logs| self.form.terms(logs));
         both.filter_map(|term| match term {
             Term::Oscillation { frequency_hz, correlation_time, .. } => {
                 Some(Line { frequency_hz, width_hz: 1.0 / (std::f64::consts::PI * correlation_time) })
@@ -106,7 +106,7 @@ impl Follower {
     }
 
     fn model(&self, logs: &[f64]) -> NoiseModel {
-        NoiseModel { terms: terms(&self.form, logs).filter(|term| term.kind() != Kind::BiasInstability).collect() }
+        NoiseModel { terms: self.form.terms(logs).filter(|term| term.kind() != Kind::BiasInstability).collect() }
     }
 
     /// `unit`: of the log, SI.

@@ -132,6 +132,11 @@ impl Form {
         })
     }
 
+    /// The processes at these logarithms; a ramp is none of them.
+    pub(super) fn terms<'a>(&'a self, logs: &'a [f64]) -> impl Iterator<Item = Term> + 'a {
+        self.split(logs).filter_map(|(piece, own)| piece.term(&own.iter().map(|v| v.exp()).collect::<Vec<f64>>()))
+    }
+
     /// This form and its logarithms with one piece more, and where its logarithms are.
     pub(super) fn with(&self, logs: &[f64], piece: Piece, own: &[f64]) -> (Form, Vec<f64>, Range<usize>) {
         let at = self.pieces.partition_point(|p| *p <= piece);

@@ -33,7 +33,5 @@ pub fn maximum(start: &NoiseModel, logs: &[Vec<Stretch<'_>>], dt: f64) -> Option
         })
         .collect();
     let found = Exact::new(&data, &form, &at, logs)?.refine(&at, &bounds)?;
-    let values = |own: &[f64]| own.iter().map(|v| v.exp()).collect::<Vec<f64>>();
-    let terms = form.split(&found.logs).filter_map(|(piece, own)| piece.term(&values(own))).collect();
-    Some((NoiseModel { terms }, found.log_likelihood))
+    Some((NoiseModel { terms: form.terms(&found.logs).collect() }, found.log_likelihood))
 }

@@ -74,13 +74,14 @@ pub(super) fn identify(
     choice: &ModelChoice,
 ) -> Result<Identified, IdentifyError> {
     let rates = same_length(stretches);
-    let rate = rates.first().copied().unwrap_or_default();
-    usable(name, rate)?;
     let failed = |message: String| IdentifyError { message: format!("{name}: {message}") };
+    let nothing = || failed("no samples".into());
+    let rate = *rates.first().ok_or_else(nothing)?;
+    rates.iter().try_for_each(|own| usable(name, own))?;
     let search = || {
-        let data = Ordinates::of_several(&rates, dt);
+        let data = Ordinates::of_several(&rates, dt)?;
         let lines = data.lines.clone();
-        choose(data, choice, &|| thirds(&rates, dt, &lines), logs)
+        Some(choose(data, choice, &|| thirds(&rates, dt, &lines), logs))
     };
     let allan = || match rates[..] {
         [rate] => allan::curve(rate, dt, Deviation::Oadev, TauGrid::Log(POINTS_PER_DECADE)),
@@ -92,6 +93,7 @@ pub(super) fn identify(
     };
     let (curve, found) = rayon::join(allan, search);
     let curve = curve.map_err(|e| failed(e.to_string()))?;
+    let found = found.ok_or_else(nothing)?;
     Whole { name, samples: rate.len(), level: mean(rate), dt, display, choice }.identified(found, curve)
 }
 
@@ -165,11 +167,7 @@ impl Whole<'_> {
             None => {
                 // drift that is not told apart is there all the same
                 let slopes = model.terms.iter().filter(|term| term.kind() == Kind::RateRamp).copied();
-                let pieces = fit
-                    .form
-                    .split(&fit.logs)
-                    .filter_map(|(piece, own)| piece.term(&own.iter().map(|v| v.exp()).collect::<Vec<f64>>()));
-                let every = NoiseModel { terms: pieces.chain(slopes).collect() };
+                let every = NoiseModel { terms: fit.form.terms(&fit.logs).chain(slopes).collect() };
                 (bias(level, samples, dt, &every, display), None)
             }
         };

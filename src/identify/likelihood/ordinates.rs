@@ -82,8 +82,8 @@ impl Ordinates {
         Ordinates { bins, grid, lines, samples: n, windows: 1.0, dt }
     }
 
-    /// Stretches of one length, with the lines that stand out of any of them.
-    pub(super) fn of_several(rates: &[&[f64]], dt: f64) -> Ordinates {
+    /// Stretches of one length, with the lines that stand out of any of them; `None` of none.
+    pub(super) fn of_several(rates: &[&[f64]], dt: f64) -> Option<Ordinates> {
         let alone: Vec<Ordinates> = rates.par_iter().map(|rate| Ordinates::new(rate, dt, None)).collect();
         let mut lines: Vec<Line> = alone.iter().flat_map(|own| own.lines.iter().copied()).collect();
         lines.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
@@ -92,10 +92,7 @@ impl Ordinates {
             true => own,
             false => Ordinates::new(rate, dt, Some(&lines)),
         };
-        let mut all = rates.par_iter().zip(alone).map(again).collect::<Vec<_>>().into_iter();
-        let mut pooled = all.next().unwrap_or_else(|| Ordinates::new(&[], dt, None));
-        all.for_each(|own| pooled.add(&own));
-        pooled
+        Ordinates::pooled(&rates.par_iter().zip(alone).map(again).collect::<Vec<_>>())
     }
 
     /// Windows of the same length and lines taken together; `None` of none.

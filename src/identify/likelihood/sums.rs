@@ -4,7 +4,6 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::FAST;
-use super::form::Form;
 use super::interval;
 use super::ordinates::Ordinates;
 use super::whittle::{self, Fit};
@@ -44,22 +43,14 @@ pub(super) fn sums(data: &Ordinates, fit: &Fit, information: Option<&DMatrix<f64
     let covariance = interval::covariance(&information);
     let sum = |square: &dyn Fn(&[f64]) -> f64| root(square, &fit.logs, covariance.as_ref());
     // which drift is fast is decided once, not anew at every step
-    let fast: Vec<bool> = terms(&fit.form, &fit.logs).map(|term| counts_as_white(&term, data.dt)).collect();
+    let fast: Vec<bool> = fit.form.terms(&fit.logs).map(|term| counts_as_white(&term, data.dt)).collect();
     let over = |logs: &[f64], white: bool, of: &dyn Fn(&Term) -> f64| -> f64 {
-        terms(&fit.form, logs).zip(&fast).filter(|(_, fast)| **fast == white).map(|(term, _)| of(&term)).sum()
+        fit.form.terms(logs).zip(&fast).filter(|(_, fast)| **fast == white).map(|(term, _)| of(&term)).sum()
     };
     Sums {
         white: sum(&|logs| over(logs, true, &|term| term.psd(0.0, data.dt))),
         walk: sum(&|logs| over(logs, false, &growth)).filter(|_| !fit.form.has(Kind::BiasInstability)),
     }
-}
-
-/// Of the logarithms; a ramp is none.
-pub(super) fn terms<'a>(form: &'a Form, logs: &'a [f64]) -> impl Iterator<Item = Term> {
-    form.split(logs).filter_map(|(piece, own)| {
-        let values: Vec<f64> = own.iter().map(|v| v.exp()).collect();
-        piece.term(&values)
-    })
 }
 
 /// Variance per second over times that are short beside the correlation time.

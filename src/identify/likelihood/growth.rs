@@ -40,11 +40,10 @@ fn cost(piece: Piece, data: &Ordinates) -> f64 {
     match piece {
         Piece::White => 0.0,
         Piece::MovingAverage(_) => 9.0,
-        // a chain of Gauss-Markov processes under one coefficient: it takes the place of a single one too easily
-        Piece::Flicker => 10.0,
+        // the same: likelihood alone decides between one Gauss-Markov process and a chain of them under one coefficient
+        Piece::Flicker | Piece::GaussMarkov => 10.0,
         Piece::Quantization | Piece::RandomWalk => 7.0,
         Piece::Ramp => 8.0,
-        Piece::GaussMarkov => 13.0,
         // looked for at every frequency
         Piece::Oscillation => 9.0 + 2.0 * (data.samples as f64).ln(),
     }
@@ -62,6 +61,11 @@ impl Visited {
                 self.fits.insert(fit.form.clone(), fit);
             }
         }
+    }
+
+    /// Also the models with one process of `fit` less, or another in its place.
+    pub(super) fn beside(&mut self, data: &Ordinates, fit: &Fit) {
+        better(data, self, fit, rearrangements(data, fit));
     }
 
     /// Best score first.

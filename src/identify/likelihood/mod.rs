@@ -40,7 +40,7 @@ use crate::units::Unit;
 use exact::{Exact, Refined};
 use form::{Form, Piece};
 pub(super) use growth::LONGEST_AVERAGE;
-use growth::score;
+use growth::{Visited, score};
 use interval::{Precision, precisions};
 use names::{name_of, parameter_name, term_name, unit_of};
 use ordinates::Ordinates;
@@ -55,6 +55,8 @@ const CLOSE: f64 = 6.0;
 const CLEARLY: f64 = 3.0;
 /// Candidates whose parameters are looked at, at most.
 const LOOKED_AT: usize = 12;
+/// Models without a told drift at the head of the list beside which others are looked for, at most.
+const SEEN_BESIDE: usize = 3;
 /// A Gauss-Markov process that forgets within so many samples is a matter of the sensor's bandwidth, not drift.
 const FAST: f64 = 10.0;
 /// Candidates that are tried on the part of the log they have not seen.
@@ -245,22 +247,40 @@ fn choose(
 
 /// Fits of the models that come into question, best score first, with what is known of their parameters.
 fn fits(data: &Ordinates, choice: &ModelChoice) -> Vec<(Fit, Vec<Precision>)> {
-    let fits: Vec<Fit> = match choice {
-        ModelChoice::Auto => growth::grow(data).ranked(data).into_iter().take(LOOKED_AT).cloned().collect(),
-        ModelChoice::Terms { kinds, average } => {
-            forms(kinds, *average).par_iter().filter_map(|form| growth::fit(data, form)).collect()
-        }
-    };
-    let known = |fit| {
+    let known = |fit: Fit| {
         let known = precisions(data, &fit);
         (fit, known)
     };
-    let mut fits: Vec<(Fit, Vec<Precision>)> = fits.into_par_iter().map(known).collect();
-    fits.sort_by(|a, b| score(&a.0, data).total_cmp(&score(&b.0, data)));
-    if *choice == ModelChoice::Auto && fits.iter().all(|(fit, known)| !told(data, fit, known)) {
-        fits.extend(fits.first().and_then(|best| reduced(data, best)));
+    match choice {
+        ModelChoice::Auto => {
+            let mut visited = growth::grow(data);
+            let best = |visited: &Visited, before: &[(Fit, Vec<Precision>)]| -> Vec<(Fit, Vec<Precision>)> {
+                let seen =
+                    |fit: &Fit| before.iter().find(|(old, _)| old.form == fit.form && old.logs == fit.logs).cloned();
+                let ranked: Vec<&Fit> = visited.ranked(data).into_iter().take(LOOKED_AT).collect();
+                ranked.into_par_iter().map(|fit| seen(fit).unwrap_or_else(|| known(fit.clone()))).collect()
+            };
+            let mut fits = best(&visited, &[]);
+            let untold = fits.iter().take_while(|(fit, known)| !told(data, fit, known)).take(SEEN_BESIDE);
+            let untold: Vec<Fit> = untold.map(|(fit, _)| fit.clone()).collect();
+            if !untold.is_empty() {
+                // the search went by way of drift that the log does not tell: what could stand in its place may not have been seen
+                untold.iter().for_each(|fit| visited.beside(data, fit));
+                fits = best(&visited, &fits);
+            }
+            if fits.iter().all(|(fit, known)| !told(data, fit, known)) {
+                fits.extend(fits.first().and_then(|best| reduced(data, best)));
+            }
+            fits
+        }
+        ModelChoice::Terms { kinds, average } => {
+            let forms = forms(kinds, *average);
+            let fits = forms.par_iter().filter_map(|form| growth::fit(data, form));
+            let mut fits: Vec<(Fit, Vec<Precision>)> = fits.map(known).collect();
+            fits.sort_by(|a, b| score(&a.0, data).total_cmp(&score(&b.0, data)));
+            fits
+        }
     }
-    fits
 }
 
 /// A model at its best parameters, drift that is not identified included.

@@ -9,7 +9,10 @@ use super::points::{Distance, Points};
 use super::selection::{FIT_LEVEL, PENALTY, Table, score, search};
 use super::shape::{Role, Shape, document_name, in_allan_curve, roles, short_name};
 use super::weighted_fit::{Fit, tolerated};
-use super::{Candidate, Identified, IdentifyError, LENGTHS_TO_TELL, ModelChoice, WIDEST_INTERVAL, bias, entry, usable};
+use super::{
+    Candidate, Identified, IdentifyError, LENGTHS_TO_TELL, ModelChoice, WIDEST_INTERVAL, bias, entry, usable,
+    worth_recording,
+};
 use crate::allan::{self, AllanCurve, Deviation, TauGrid};
 use crate::noise::{Kind, NoiseModel, Term};
 use crate::numerics::distribution::NORMAL_95;
@@ -234,7 +237,9 @@ impl Words<'_> {
         NotIdentified {
             term: Words::parameter_name(fit, index),
             reason: format!("{reason}, model {}", fit.shape.label()),
-            needed_log_s: self.length_for(fit, index, WIDEST_INTERVAL),
+            needed_log_s: self
+                .length_for(fit, index, WIDEST_INTERVAL)
+                .and_then(|needed| worth_recording(needed, self.points.span_s())),
         }
     }
 

@@ -141,6 +141,14 @@ const WIDEST_INTERVAL: f64 = 10.0;
 /// A random walk and a Gauss-Markov process differ in nearly all logs of this many correlation times, in two thirds of those half as long (docs/validation.md).
 const LENGTHS_TO_TELL: f64 = 40.0;
 
+/// A log so many times as long is nothing to recommend.
+const MOST_LENGTHS: f64 = 100.0;
+
+/// The length of a log that would tell, if anybody would record it; `span_s`: of the one at hand.
+fn worth_recording(needed_s: f64, span_s: f64) -> Option<f64> {
+    (needed_s > span_s && needed_s < MOST_LENGTHS * span_s).then_some(needed_s)
+}
+
 /// Fewest samples from which anything is identified: three averages of ten samples.
 pub const FEWEST_SAMPLES: usize = 30;
 

@@ -51,6 +51,24 @@ fn weighted_mean_of_white_noise() {
     assert!((ratio - 1.0).abs() < 1e-3, "{ratio}");
 }
 
+/// A minute tells nothing of a drift of minutes; what it asks for instead is a log that somebody could record, or none (before: up to 10¹² days).
+#[test]
+fn no_absurd_log_is_asked_for() {
+    let (dt, forced) = (0.01, parse_model("white+gm").unwrap());
+    let mut untold = 0;
+    for run in 0..4 {
+        let rate = log(&[white(N), gauss_markov(SIGMA, TC)], 6000, dt, 47, run);
+        for method in [Method::Gmwm, Method::Allan, Method::Likelihood] {
+            let found = by(method, &rate, dt, &forced);
+            untold += found.not_identified.len();
+            for needed in found.not_identified.iter().filter_map(|entry| entry.needed_log_s) {
+                assert!((60.0..6000.0).contains(&needed), "{method:?}: {needed}");
+            }
+        }
+    }
+    assert!(untold >= 12, "{untold}");
+}
+
 /// Eight logs of 2 h, as for the Allan fit: each |z| < 6, the mean of the eight within 4.9/√8 (1e-6).
 #[test]
 fn reference_sensor_is_recovered_within_its_intervals() {

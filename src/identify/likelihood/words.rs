@@ -2,7 +2,7 @@
 
 use super::super::selection::FIT_LEVEL;
 use super::super::shape::{Role, document_name};
-use super::super::{LENGTHS_TO_TELL, WIDEST_INTERVAL, coefficient_unit};
+use super::super::{LENGTHS_TO_TELL, WIDEST_INTERVAL, coefficient_unit, worth_recording};
 use super::form::Piece;
 use super::growth::score;
 use super::interval::Precision;
@@ -17,8 +17,6 @@ use crate::units::{Unit, digits};
 
 /// A log with more of its power than this at one frequency is a sinusoid.
 const TONE: f64 = 0.98;
-/// A log so many times as long is nothing to recommend.
-const MOST_LENGTHS: f64 = 100.0;
 
 /// Sentences about one axis, numbers in the unit of the log.
 pub(super) struct Words<'a> {
@@ -63,8 +61,7 @@ impl Words<'_> {
         NotIdentified {
             term: name_of(&fit.form, index),
             reason: format!("{reason}, model {}", fit.form.label()),
-            needed_log_s: (needed > self.data.total_s() && needed < MOST_LENGTHS * self.data.total_s())
-                .then_some(needed),
+            needed_log_s: worth_recording(needed, self.data.total_s()),
         }
     }
 

@@ -251,6 +251,26 @@ mod tests {
         assert!(all[100..103].iter().all(|v| v.is_nan()) && all[103] == 1.0);
     }
 
+    /// Fifty samples, a gap too long to fill, then two short holes: what is beside the axis is moved as the axis is, and goes straight on over a hole.
+    #[test]
+    fn beside_what_is_filled_in_stands_what_was_there() {
+        let mut rate: Vec<f64> = (0..3050_u32).map(|i| f64::from(i.wrapping_mul(2_654_435_761) >> 8)).collect();
+        rate[2000] = f64::NAN;
+        let gaps = [Gap { index: 50, missing: 1000 }, Gap { index: 1000, missing: 5 }];
+        let kind = InputKind::Rate;
+        let whole = pieces(&rate, &gaps, kind, <[f64]>::to_vec);
+        let unit = Unit::parse("rad/s").unwrap();
+        let (rate, range) = (Vec::new(), 0..0);
+        let mut own = Stretch { name: "x".into(), unit, rate, phase: None, left_out: 1, filled: 0, range, whole };
+        own.bridge();
+        assert_eq!((own.rate.len(), own.filled, own.left_out), (3005, 6, 50));
+        let index: Vec<f64> = (0..3050).map(f64::from).collect();
+        let (all, parts) = own.beside(&index, &gaps, kind);
+        let seen = (50..1000).chain([999; 5]).chain(1000..3050).map(f64::from);
+        assert_eq!(all, seen.collect::<Vec<_>>());
+        assert_eq!(parts.concat(), index);
+    }
+
     #[test]
     fn longest_run_ends_at_gaps_and_nan() {
         let nan = f64::NAN;

@@ -40,7 +40,7 @@ fn cost(piece: Piece, data: &Ordinates) -> f64 {
     match piece {
         Piece::White => 0.0,
         Piece::MovingAverage(_) => 9.0,
-        // the same: likelihood alone decides between one Gauss-Markov process and a chain of them under one coefficient
+        // at one cost, so that likelihood alone decides between a Gauss-Markov process and a chain of them under one coefficient
         Piece::Flicker | Piece::GaussMarkov => 10.0,
         Piece::Quantization | Piece::RandomWalk => 7.0,
         Piece::Ramp => 8.0,

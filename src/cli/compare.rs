@@ -194,7 +194,7 @@ const BESIDE_CAPTION: &str = "The file's numbers beside the log's own (95 % inte
 const BESIDE: [&str; 9] = ["axis", "parameter", "file", "this log", "from", "to", "unit", "file/log", "held against"];
 
 fn beside_rows(result: &Comparison) -> Vec<Vec<String>> {
-    let number = |value: Option<f64>| value.map_or_else(|| "-".into(), digits);
+    let number = |value: Option<f64>| value.filter(|v| v.is_finite()).map_or_else(|| "-".into(), digits);
     let row = |b: &Beside| {
         let ends = b.interval.map_or([None; 2], |ends| ends.map(Some));
         let cells = [Some(b.file), b.log, ends[0], ends[1]].map(number);

@@ -196,8 +196,11 @@ fn beside(axis: &str, path: &str, file: f64, unit: &Unit, estimate: Option<Estim
     let Some(Estimate { value, interval, how }) = estimate else { return row };
     let (log, interval) = (unit.from_si(value), interval.map(|ends| ends.map(|end| unit.from_si(end))));
     let inside = interval.map(|[low, high]| (low..=high).contains(&file));
-    let shown =
-        interval.map_or_else(|| "no interval".into(), |[low, high]| format!("{} … {}", digits(low), digits(high)));
+    let shown = match interval {
+        None => "no interval".into(),
+        Some([low, high]) if !high.is_finite() => format!("above {}", digits(low)),
+        Some([low, high]) => format!("{} … {}", digits(low), digits(high)),
+    };
     let verdict = match inside {
         None => "this log does not bound it",
         Some(true) => "inside",

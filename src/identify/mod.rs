@@ -138,7 +138,7 @@ pub struct IdentifyError {
 
 /// Largest upper/lower ratio of a 95 % interval that still says something.
 const WIDEST_INTERVAL: f64 = 10.0;
-/// A random walk and a Gauss-Markov process differ in nearly all logs of this many correlation times, in two thirds of those half as long (docs/validation.md).
+/// A random walk and a Gauss-Markov process differ in nearly all logs of this many correlation times, in three quarters and more of those half as long (docs/validation.md).
 const LENGTHS_TO_TELL: f64 = 40.0;
 
 /// A log so many times as long is nothing to recommend.

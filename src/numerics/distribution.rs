@@ -9,6 +9,10 @@ use statrs::function::gamma::{checked_gamma_lr, checked_gamma_ur};
 
 /// Two-sided 95 % point of the normal distribution.
 pub const NORMAL_95: f64 = 1.959_963_984_540_054;
+/// Two-sided 90 % point, of a one-sided test at 5 %.
+pub const NORMAL_90: f64 = 1.644_853_626_951_472_2;
+/// That of 99 %.
+pub const NORMAL_99: f64 = 2.575_829_303_548_900_4;
 /// Median of χ²₁.
 pub const CHI_SQUARE_1_MEDIAN: f64 = 0.454_936_423_119_572_8;
 

@@ -6,7 +6,7 @@ use kfdesign::params::{Params, TermEntry};
 use kfdesign::signal::bridge::bridge;
 use kfdesign::units::Unit;
 
-use super::{N, SIGMA, gauss_markov, log, white};
+use super::{N, SIGMA, TC, gauss_markov, log, white};
 use crate::support::{Bench, measured};
 
 /// Three axes in one log, the middle one with an unusable sample: the numbers of the command are those of the library.
@@ -107,6 +107,35 @@ fn command_shows_tables_and_refuses_what_it_must() {
         assert!(out.stdout.is_empty());
     }
     assert_eq!(bench.files(), ["log.csv"]);
+}
+
+/// An hour of the reference sensor whose correlation time has a lower limit alone: `null` in the document, a dash in the table, the reason in words. The
+/// document is a design like any other, but for what needs both limits.
+#[test]
+fn a_correlation_time_without_an_upper_limit_goes_through() {
+    let bench = Bench::new();
+    bench.file("log.csv", {
+        let rate = log(&[white(N), gauss_markov(SIGMA, TC)], 3600, 1.0, 47, 2);
+        rate.iter().fold("gyro_x (deg/s)\n".to_string(), |text, x| text + &format!("{:.9}\n", x + 0.6))
+    });
+    let text = bench.ok("identify log.csv --rate 1 -o params.json --report r.html");
+    let row = text.lines().find(|line| line.starts_with("Gauss-Markov Tc")).unwrap();
+    assert_eq!(row.split_whitespace().nth(4), Some("-"), "{row}");
+    assert!(text.contains("gauss_markov.correlation_time: above"), "{text}");
+    let document: serde_json::Value = serde_json::from_str(&bench.read("params.json")).unwrap();
+    let [sigma, time] = ["std_dev", "correlation_time"].map(|name| &document["axes"][0]["gauss_markov"][0][name]);
+    for of in [sigma, time] {
+        assert!(of["interval"][0].as_f64() < of["value"].as_f64() && of["interval"][1].is_null(), "{of}");
+    }
+    bench.ok("tune params.json -o filter.json");
+    let exported = bench.ok("export params.json --to gnss-ins-sim");
+    // N has an interval, K has none
+    let densities = exported.lines().find(|line| line.contains("K = ")).unwrap();
+    assert!(densities.matches('[').count() == 1 && !densities.contains("inf]"), "{exported}");
+    let out = bench.run("tune params.json -o robust.json --objective robust");
+    let said = "no interval of gauss_markov.std_dev, gauss_markov.correlation_time, or one without an end";
+    assert!(out.status == 2 && out.stderr.contains(said), "{out:?}");
+    assert_eq!(bench.files(), ["filter.json", "log.csv", "params.json", "r.html"]);
 }
 
 /// The measured industrial gyro whose white density is known from its Allan deviation at 1 s (deg/s/√Hz, computed independently),

@@ -5,6 +5,7 @@ mod gaps;
 mod recent;
 mod shared;
 mod study;
+mod told;
 mod tones;
 
 use std::f64::consts::{PI, TAU};

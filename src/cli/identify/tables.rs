@@ -48,7 +48,8 @@ pub(super) fn parameters(axis: &Axis, quantity: Quantity) -> Shown {
 }
 
 fn row(name: &str, value: &Measured, also: String) -> Vec<String> {
-    let [lower, upper] = value.interval.map_or(["-".into(), "-".into()], |i| i.map(digits));
+    let end = |end: f64| if end.is_finite() { digits(end) } else { "-".into() };
+    let [lower, upper] = value.interval.map_or(["-".into(), "-".into()], |ends| ends.map(end));
     vec![name.to_string(), digits(value.value), lower, upper, value.unit.to_string(), also]
 }
 

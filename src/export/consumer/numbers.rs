@@ -221,7 +221,7 @@ fn walk_interval(axis: &AxisParams, rule: Walk) -> Option<[f64; 2]> {
             let at =
                 |std_dev: f64, correlation_time: f64| GaussMarkov { std_dev, correlation_time }.growth(rule).sqrt();
             let ends = [at(sigma[0], time[1]), at(sigma[1], time[0])];
-            ends.iter().all(|end| end.is_finite()).then_some(ends)
+            [sigma, time, ends].as_flattened().iter().all(|end| end.is_finite()).then_some(ends)
         }
         _ => None,
     }

@@ -43,7 +43,8 @@ fn cost(piece: Piece, data: &Ordinates) -> f64 {
         // at one cost, so that likelihood alone decides between a Gauss-Markov process and a chain of them under one coefficient
         Piece::Flicker | Piece::GaussMarkov => 10.0,
         Piece::Quantization | Piece::RandomWalk => 7.0,
-        Piece::Ramp => 8.0,
+        // beside drift that is not known well either
+        Piece::Ramp => 10.0,
         // looked for at every frequency
         Piece::Oscillation => 9.0 + 2.0 * (data.samples as f64).ln(),
     }
@@ -61,11 +62,6 @@ impl Visited {
                 self.fits.insert(fit.form.clone(), fit);
             }
         }
-    }
-
-    /// Also the models with one process of `fit` less, or another in its place.
-    pub(super) fn beside(&mut self, data: &Ordinates, fit: &Fit) {
-        better(data, self, fit, rearrangements(data, fit));
     }
 
     /// Best score first.

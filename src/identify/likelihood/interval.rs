@@ -3,12 +3,16 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
+use super::super::shape::Role;
+use super::form::{Form, Piece};
 use super::ordinates::Ordinates;
 use super::whittle::{self, Fit};
-use crate::numerics::distribution::NORMAL_95;
+use crate::numerics::distribution::{NORMAL_90, NORMAL_95, NORMAL_99};
 
 /// Standard deviation of a logarithm from which the likelihood is no parabola any more; of drift parameters, and of others.
 const ROUGH: [f64; 2] = [0.03, 0.15];
+/// Of the search for a limit.
+const STEPS: usize = 32;
 
 /// What the log says about one logarithm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,12 +24,21 @@ pub(super) struct Precision {
     /// 95 % limits; None where the likelihood stays above its 95 % level up to the end of what is searched.
     pub(super) lower: Option<f64>,
     pub(super) upper: Option<f64>,
+    /// The 90 % interval has both ends: one-sided tests at 5 % refuse that there is nothing of it, and that a correlation time has no end
+    /// (a random walk).
+    pub(super) told: bool,
 }
 
 impl Precision {
-    /// Both limits.
+    /// What is known, an open side infinite; `None` where both are.
     pub(super) fn interval(&self) -> Option<[f64; 2]> {
-        Some([self.lower?, self.upper?])
+        let limits = [self.lower.unwrap_or(f64::NEG_INFINITY), self.upper.unwrap_or(f64::INFINITY)];
+        limits.iter().any(|limit| limit.is_finite()).then_some(limits)
+    }
+
+    /// Known to one side only, or to none.
+    pub(super) fn open(&self) -> bool {
+        self.lower.is_none() || self.upper.is_none()
     }
 }
 
@@ -34,21 +47,59 @@ pub(super) fn precisions(data: &Ordinates, fit: &Fit) -> Vec<Precision> {
     let expected = deviations(whittle::expected_information(data, &fit.form, &fit.logs));
     let observed = deviations(whittle::observed_information(data, fit));
     let bounds = whittle::bounds(data, &fit.form, &fit.logs);
-    (0..fit.logs.len())
+    let mut known: Vec<Precision> = (0..fit.logs.len())
         .into_par_iter()
         .map(|i| {
             let (sigma, bound) = (observed[i], expected[i]);
             let drift = fit.form.pieces()[fit.form.roles()[i].0].kind().is_drift();
             let rough = if drift { ROUGH[0] } else { ROUGH[1] };
-            let [lower, upper] = if sigma < rough {
-                [-1.0, 1.0].map(|side| Some(fit.logs[i] + side * NORMAL_95 * sigma))
+            let limits = if sigma < rough {
+                [-1.0, 1.0].map(|side| Ok(fit.logs[i] + side * NORMAL_95 * sigma))
             } else {
-                let step = [sigma, bound].into_iter().filter(|s| s.is_finite()).fold(rough, f64::max).min(2.0);
-                [(-1.0, bounds[i].0), (1.0, bounds[i].1)].map(|(side, end)| profile(data, fit, i, side * step, end))
+                let step = first_step(sigma, bound, rough);
+                let sides = [(-1.0, bounds[i].0), (1.0, bounds[i].1)];
+                sides.map(|(side, end)| profile(data, fit, i, [side * step, end], NORMAL_95))
             };
-            Precision { sigma, bound, lower, upper }
+            let told = limits.iter().all(|limit| limit.map_or_else(|root| root >= NORMAL_90, |_| true));
+            let [lower, upper] = limits.map(Result::ok);
+            Precision { sigma, bound, lower, upper, told }
         })
-        .collect()
+        .collect();
+    for std_dev in endless(&fit.form, &known) {
+        let step = first_step(known[std_dev].sigma, known[std_dev].bound, ROUGH[0]);
+        known[std_dev].lower = profile(data, fit, std_dev, [-step, bounds[std_dev].0], NORMAL_99).ok();
+        known[std_dev].upper = None;
+    }
+    known
+}
+
+/// Numbers of σ of the Gauss-Markov processes whose correlation time has a lower limit and no upper one: σ, which grows with it, has no upper limit
+/// either (the end of the search is none), and its lower one is that of 99 %, because that of 95 % is right in 90 % of the logs in which it is the only one
+/// (docs/validation.md).
+fn endless(form: &Form, known: &[Precision]) -> Vec<usize> {
+    let open = |[_, time]: &[usize; 2]| known[*time].upper.is_none() && known[*time].lower.is_some();
+    gauss_markov(form).into_iter().filter(open).map(|[std_dev, _]| std_dev).collect()
+}
+
+/// `known` after a step of the search, with no upper limit of what had none before.
+pub(super) fn keep_open(form: &Form, mut known: Vec<Precision>) -> Vec<Precision> {
+    for std_dev in endless(form, &known) {
+        known[std_dev].upper = None;
+    }
+    known
+}
+
+fn first_step(sigma: f64, bound: f64, shortest: f64) -> f64 {
+    [sigma, bound].into_iter().filter(|s| s.is_finite()).fold(shortest, f64::max).min(2.0)
+}
+
+/// Numbers of σ and Tc of every Gauss-Markov process.
+pub(super) fn gauss_markov(form: &Form) -> Vec<[usize; 2]> {
+    let pieces = form.pieces();
+    let is_time = |(_, (piece, role)): &(usize, (usize, Role))| {
+        pieces[*piece] == Piece::GaussMarkov && *role == Role::CorrelationTime
+    };
+    form.roles().into_iter().enumerate().filter(is_time).map(|(i, _)| [i - 1, i]).collect()
 }
 
 /// Standard deviations that belong to an information matrix.
@@ -70,39 +121,43 @@ pub(super) fn covariance(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(DMatrix::from_fn(p, p, |i, k| inverse[(i, k)] / (scale[i] * scale[k])))
 }
 
-/// Where the likelihood, maximised over all other parameters, has fallen by χ²₁(0.95)/2 on the side of `step`; `end`: of the search.
+/// Where the likelihood, maximised over all other parameters, has fallen by `level`²/2 on the side of the `first` step; `end`: of the search. Where it has not fallen so far there, the signed root of twice its fall at the end (0 where it cannot be had).
 ///
-/// The signed root of the fall is nearly straight in the logarithm and is followed by secants.
-fn profile(data: &Ordinates, fit: &Fit, index: usize, step: f64, end: f64) -> Option<f64> {
+/// The signed root of the fall is nearly straight in the logarithm and is followed by secants; where it levels off, by growing steps.
+fn profile(data: &Ordinates, fit: &Fit, index: usize, [first, end]: [f64; 2], level: f64) -> Result<f64, f64> {
     let centre = fit.logs[index];
-    let inside = |v: f64| if step > 0.0 { v.min(end) } else { v.max(end) };
-    let mut at = inside(centre + NORMAL_95 * step);
+    let inside = |v: f64| if first > 0.0 { v.min(end) } else { v.max(end) };
+    let mut at = inside(centre + level * first);
     let mut from = fit.logs.clone();
     let free: Vec<usize> = (0..from.len()).filter(|i| *i != index).collect();
     let (mut near, mut far): (f64, Option<f64>) = (centre, None);
-    for _ in 0..16 {
+    let mut before = 0.0;
+    for step in 0..STEPS {
         let mut start = from.clone();
         start[index] = at;
-        let held = whittle::climb(data, &fit.form, &start, &free)?;
+        let held = whittle::climb(data, &fit.form, &start, &free).ok_or(0.0)?;
         let root = (2.0 * (fit.log_likelihood - held.log_likelihood)).max(0.0).sqrt();
         from = held.logs;
-        if (root - NORMAL_95).abs() < 0.01 {
-            return Some(at);
+        if (root - level).abs() < 0.01 || far.is_some_and(|far| (far - near).abs() < 1e-3) {
+            return Ok(at);
         }
-        if root < NORMAL_95 {
+        if root < level {
             near = at;
             if at == end {
-                return None;
+                return Err(root);
             }
         } else {
             far = Some(at);
         }
-        let straight = centre + (at - centre) * (NORMAL_95 / root.max(0.3)).clamp(0.2, 3.0);
+        let levels_off = far.is_none() && step > 1 && root - before < 0.3 * (level - before);
+        let shortest = if levels_off { 1.5 } else { 0.2 };
+        before = root;
+        let straight = centre + (at - centre) * (level / root.max(0.3)).clamp(shortest, 3.0);
         at = match far {
             // between the limits, or halfway when the secant leaves them
             Some(far) if (straight - near) * (straight - far) >= 0.0 => 0.5 * (near + far),
             _ => inside(straight),
         };
     }
-    Some(at)
+    far.map_or(Err(before), |_| Ok(at))
 }

@@ -25,9 +25,7 @@ mod words;
 use rayon::prelude::*;
 
 use super::shape::Role;
-use super::{
-    Candidate, Identified, IdentifyError, ModelChoice, Precision as Known, WIDEST_INTERVAL, bias, entry, usable,
-};
+use super::{Candidate, Identified, IdentifyError, ModelChoice, Precision as Known, bias, entry, usable};
 use crate::allan::{self, AllanCurve, Deviation, Pooled, TauGrid, deviation};
 use crate::consistency::spectrum::departure;
 use crate::filter::likelihood::Stretch;
@@ -40,7 +38,7 @@ use crate::units::Unit;
 use exact::{Exact, Refined};
 use form::{Form, Piece};
 pub(super) use growth::LONGEST_AVERAGE;
-use growth::{Visited, score};
+use growth::score;
 use interval::{Precision, precisions};
 use names::{name_of, parameter_name, term_name, unit_of};
 use ordinates::Ordinates;
@@ -55,8 +53,6 @@ const CLOSE: f64 = 6.0;
 const CLEARLY: f64 = 3.0;
 /// Candidates whose parameters are looked at, at most.
 const LOOKED_AT: usize = 12;
-/// Models without a told drift at the head of the list beside which others are looked for, at most.
-const SEEN_BESIDE: usize = 3;
 /// A Gauss-Markov process that forgets within so many samples is a matter of the sensor's bandwidth, not drift.
 const FAST: f64 = 10.0;
 /// Candidates that are tried on the part of the log they have not seen.
@@ -253,21 +249,9 @@ fn fits(data: &Ordinates, choice: &ModelChoice) -> Vec<(Fit, Vec<Precision>)> {
     };
     match choice {
         ModelChoice::Auto => {
-            let mut visited = growth::grow(data);
-            let best = |visited: &Visited, before: &[(Fit, Vec<Precision>)]| -> Vec<(Fit, Vec<Precision>)> {
-                let seen =
-                    |fit: &Fit| before.iter().find(|(old, _)| old.form == fit.form && old.logs == fit.logs).cloned();
-                let ranked: Vec<&Fit> = visited.ranked(data).into_iter().take(LOOKED_AT).collect();
-                ranked.into_par_iter().map(|fit| seen(fit).unwrap_or_else(|| known(fit.clone()))).collect()
-            };
-            let mut fits = best(&visited, &[]);
-            let untold = fits.iter().take_while(|(fit, known)| !told(data, fit, known)).take(SEEN_BESIDE);
-            let untold: Vec<Fit> = untold.map(|(fit, _)| fit.clone()).collect();
-            if !untold.is_empty() {
-                // the search went by way of drift that the log does not tell: what could stand in its place may not have been seen
-                untold.iter().for_each(|fit| visited.beside(data, fit));
-                fits = best(&visited, &fits);
-            }
+            let visited = growth::grow(data);
+            let ranked: Vec<&Fit> = visited.ranked(data).into_iter().take(LOOKED_AT).collect();
+            let mut fits: Vec<(Fit, Vec<Precision>)> = ranked.into_par_iter().map(|fit| known(fit.clone())).collect();
             if fits.iter().all(|(fit, known)| !told(data, fit, known)) {
                 fits.extend(fits.first().and_then(|best| reduced(data, best)));
             }
@@ -347,9 +331,11 @@ fn moved(
             // where the likelihood is flat its maximum moves far, its limits do not; one that it has passed is none
             old => old.filter(|old| side * (old - to) > 0.0),
         };
-        Precision { sigma, bound: old.bound / more.sqrt(), lower: limit(old.lower, -1.0), upper: limit(old.upper, 1.0) }
+        let [lower, upper] = [limit(old.lower, -1.0), limit(old.upper, 1.0)];
+        let told = old.told || (lower.is_some() && upper.is_some());
+        Precision { sigma, bound: old.bound / more.sqrt(), lower, upper, told }
     };
-    known.iter().enumerate().map(of).collect()
+    interval::keep_open(&before.form, known.iter().enumerate().map(of).collect())
 }
 
 /// The forms that a list of kinds may mean: the length of a moving average may be open.
@@ -375,7 +361,7 @@ fn forms(kinds: &[Kind], average: Option<u32>) -> Vec<Form> {
     all
 }
 
-/// Numbers of the drift parameters whose interval says nothing. What is faster is judged by the filter's innovations, not by its numbers: also a
+/// Numbers of the drift parameters that the log does not tell. What is faster is judged by the filter's innovations, not by its numbers: also a
 /// Gauss-Markov process that surely forgets within [`FAST`] samples.
 fn unknown(data: &Ordinates, fit: &Fit, known: &[Precision]) -> Vec<usize> {
     let roles = fit.form.roles();
@@ -384,10 +370,10 @@ fn unknown(data: &Ordinates, fit: &Fit, known: &[Precision]) -> Vec<usize> {
         time.and_then(|time| known[time].upper).is_some_and(|upper| upper.exp() < FAST * data.dt)
     };
     let drift = |i: &usize| fit.form.pieces()[roles[*i].0].kind().is_drift() && !fast(*i);
-    wide(known).into_iter().filter(drift).collect()
+    (0..known.len()).filter(|i| !known[*i].told).filter(drift).collect()
 }
 
-/// Every drift parameter has an interval that says something; that of a slope does not hold zero.
+/// The log tells every drift parameter; the interval of a slope does not hold zero.
 fn told(data: &Ordinates, fit: &Fit, known: &[Precision]) -> bool {
     let sloped = || fit.slope.abs() > NORMAL_95 * whittle::slope_sigma(data, &fit.form, &fit.logs);
     unknown(data, fit, known).is_empty() && (!fit.form.has(Kind::RateRamp) || sloped())
@@ -405,16 +391,10 @@ fn reduced(data: &Ordinates, best: &(Fit, Vec<Precision>)) -> Option<(Fit, Vec<P
     Some(found)
 }
 
-/// Numbers of all parameters whose interval says nothing.
-fn wide(known: &[Precision]) -> Vec<usize> {
-    let wide = |p: &Precision| p.interval().is_none_or(|[low, high]| high - low > WIDEST_INTERVAL.ln());
-    (0..known.len()).filter(|i| wide(&known[*i])).collect()
-}
-
 /// A process with what is known of its parameters.
 struct Found {
     term: Term,
-    /// 95 %, SI.
+    /// 95 %, SI; an open side is 0 or infinite.
     intervals: Vec<Option<[f64; 2]>>,
     /// Relative standard deviation and its bound.
     precision: Vec<[f64; 2]>,

@@ -3,15 +3,15 @@
 use super::super::selection::FIT_LEVEL;
 use super::super::shape::{Role, document_name};
 use super::super::{LENGTHS_TO_TELL, WIDEST_INTERVAL, coefficient_unit, worth_recording};
+use super::CLOSE;
 use super::form::Piece;
 use super::growth::score;
-use super::interval::Precision;
+use super::interval::{Precision, gauss_markov};
 use super::names::{name_of, unit_of};
 use super::ordinates::Ordinates;
 use super::whittle::{self, Fit};
-use super::{CLOSE, wide};
 use crate::noise::{Kind, Term};
-use crate::numerics::distribution::NORMAL_95;
+use crate::numerics::distribution::{NORMAL_90, NORMAL_95};
 use crate::params::NotIdentified;
 use crate::units::{Unit, digits};
 
@@ -33,7 +33,8 @@ impl Words<'_> {
 
     pub(super) fn unknown_parameters(&self, fit: &Fit, known: &[Precision]) -> Vec<NotIdentified> {
         let line = |i: &usize| fit.form.pieces()[fit.form.roles()[*i].0] != Piece::Oscillation;
-        wide(known).into_iter().filter(line).map(|i| self.not_identified(fit, i, &known[i])).collect()
+        let open = |i: &usize| known[*i].open();
+        (0..known.len()).filter(open).filter(line).map(|i| self.not_identified(fit, i, &known[i])).collect()
     }
 
     /// Lines as narrow as the log is long: how long their correlation times are at least.
@@ -51,13 +52,18 @@ impl Words<'_> {
         let span = digits(self.data.total_s());
         let value = |log: f64| self.shown(fit, index, log);
         let reason = match (known.lower, known.upper) {
-            (Some(low), None) => format!("above {} (97.5 %); the {span} s log sets no upper limit", value(low)),
-            (None, Some(high)) => format!("below {} (97.5 %); the {span} s log sets no lower limit", value(high)),
-            (Some(low), Some(high)) => format!("between {} and {} (95 %) in the {span} s log", value(low), value(high)),
+            (Some(low), _) => format!("above {} (95 %); the {span} s log sets no upper limit", value(low)),
+            (None, Some(high)) => format!("below {} (95 %); the {span} s log sets no lower limit", value(high)),
             (None, None) => format!("the {span} s log bounds it on no side"),
         };
         // widths shrink like T^(−1/2)
         let needed = self.data.total_s() * (2.0 * NORMAL_95 * known.bound / WIDEST_INTERVAL.ln()).powi(2);
+        // and a correlation time without end is told from a random walk by more of them
+        let time = gauss_markov(&fit.form)
+            .into_iter()
+            .find(|pair| known.upper.is_none() && pair.contains(&index))
+            .map(|[_, time]| fit.logs[time].exp());
+        let needed = needed.max(time.map_or(0.0, |time| LENGTHS_TO_TELL * time));
         NotIdentified {
             term: name_of(&fit.form, index),
             reason: format!("{reason}, model {}", fit.form.label()),
@@ -93,7 +99,7 @@ impl Words<'_> {
             let estimate = time.map(|i| fit.logs[i].exp()).filter(|time| *time < self.data.span_s());
             let at_least = time.and_then(|i| known[i].lower.filter(|_| known[i].upper.is_none()));
             let at = match (at_least, estimate) {
-                (Some(low), _) => format!(", correlation time above {} s (97.5 %)", digits(low.exp())),
+                (Some(low), _) => format!(", correlation time above {} s (95 %)", digits(low.exp())),
                 (None, Some(time)) => format!(", correlation time about {} s", digits(time)),
                 (None, None) => String::new(),
             };
@@ -134,7 +140,7 @@ impl Words<'_> {
         let without = whittle::log_likelihood(self.data, &fit.form, &fit.logs);
         let fall = |log: f64| {
             let (form, logs, _) = fit.form.with(&fit.logs, Piece::RandomWalk, &[log]);
-            2.0 * (without - whittle::log_likelihood(self.data, &form, &logs)) - 2.706
+            2.0 * (without - whittle::log_likelihood(self.data, &form, &logs)) - NORMAL_90.powi(2)
         };
         let (mut low, mut high) = (touch - 9.0, touch + 6.0);
         if fall(high).is_nan() || fall(high) <= 0.0 {

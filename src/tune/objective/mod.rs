@@ -88,7 +88,8 @@ pub enum ObjectiveError {
     #[error("every parameter is held; nothing is left to be chosen")]
     AllHeld,
     #[error(
-        "--objective robust: no interval of {names}; run identify first, which gives intervals, or hold what is known exactly (--hold NAME)"
+        "--objective robust: no interval of {names}, or one without an end; run identify first, which gives intervals, on a log long enough to \
+         tell both ends, or hold what is known exactly (--hold NAME)"
     )]
     NoIntervals { names: String },
     #[error(

@@ -122,13 +122,3 @@ fn the_length_of_an_average_may_be_said() {
         assert!(parse_model(bad).is_err(), "{bad}");
     }
 }
-
-/// White noise, a weak line and flicker: the model with the best score has drift that the log does not tell, and the line must not go with it.
-#[test]
-fn a_line_stays_when_drift_is_not_told() {
-    let line = Term::Oscillation { std_dev: 0.0123, frequency_hz: 20.5, correlation_time: 0.6 };
-    let terms = [white(0.0125), line, Term::BiasInstability { coefficient: 0.0058 }];
-    let found = identify(&log(&terms, 32_500, 0.01, 46, 93), 0.01, &ModelChoice::Auto);
-    assert!(found.candidates.first().is_some_and(|best| !best.identified), "{:?}", found.candidates);
-    oscillation(&found);
-}

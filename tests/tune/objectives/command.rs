@@ -149,7 +149,10 @@ fn bad_requests_are_one_line_and_write_nothing() {
     let before = bench.files();
     for (command, words) in [
         ("tune params.json --objective guess", "guess"),
-        ("tune bare.json --objective robust", "no interval of gauss_markov.correlation_time; run identify first"),
+        (
+            "tune bare.json --objective robust",
+            "no interval of gauss_markov.correlation_time, or one without an end; run identify first",
+        ),
         ("tune params.json --objective likelihood", "--objective likelihood needs a log: --log LOG"),
         ("tune params.json --objective als", "--objective als needs a log: --log LOG"),
         ("tune params.json --objective nees", "--objective nees needs the truth: --truth PARAMS"),

@@ -109,6 +109,11 @@ fn command_shows_tables_and_refuses_what_it_must() {
     assert_eq!(bench.files(), ["log.csv"]);
 }
 
+/// The reference sensor as somebody might state it.
+const PARAMS_OF_A_CLAIM: &str = r#"{ "format": "kfdesign-params/1", "quantity": "angular-rate", "sample_rate": "1 Hz", "axes": [{ "name": "gyro_x",
+    "bias": "0.6 deg/s", "white": { "density": "0.0562 deg/s/sqrt(Hz)" },
+    "gauss_markov": [{ "std_dev": "0.028 deg/s", "correlation_time": "20 s" }] }] }"#;
+
 /// An hour of the reference sensor whose correlation time has a lower limit alone: `null` in the document, a dash in the table, the reason in words. The
 /// document is a design like any other, but for what needs both limits.
 #[test]
@@ -132,10 +137,14 @@ fn a_correlation_time_without_an_upper_limit_goes_through() {
     // N has an interval, K has none
     let densities = exported.lines().find(|line| line.contains("K = ")).unwrap();
     assert!(densities.matches('[').count() == 1 && !densities.contains("inf]"), "{exported}");
+    bench.file("claims.json", PARAMS_OF_A_CLAIM);
+    let out = bench.run("compare claims.json log.csv --rate 1 --parameters");
+    assert!(out.stdout.contains("; this log says") && out.stdout.contains(" [above "), "{out:?}");
+    assert!(!out.stdout.contains("inf]"), "{out:?}");
     let out = bench.run("tune params.json -o robust.json --objective robust");
     let said = "no interval of gauss_markov.std_dev, gauss_markov.correlation_time, or one without an end";
     assert!(out.status == 2 && out.stderr.contains(said), "{out:?}");
-    assert_eq!(bench.files(), ["filter.json", "log.csv", "params.json", "r.html"]);
+    assert_eq!(bench.files(), ["claims.json", "filter.json", "log.csv", "params.json", "r.html"]);
 }
 
 /// The measured industrial gyro whose white density is known from its Allan deviation at 1 s (deg/s/√Hz, computed independently),

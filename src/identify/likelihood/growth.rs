@@ -43,7 +43,7 @@ fn cost(piece: Piece, data: &Ordinates) -> f64 {
         // at one cost, so that likelihood alone decides between a Gauss-Markov process and a chain of them under one coefficient
         Piece::Flicker | Piece::GaussMarkov => 10.0,
         Piece::Quantization | Piece::RandomWalk => 7.0,
-        // beside drift that is not known well either
+        // beside drift of unknown size noise alone gains more: at 8, 1.7 % of random walks had one
         Piece::Ramp => 10.0,
         // looked for at every frequency
         Piece::Oscillation => 9.0 + 2.0 * (data.samples as f64).ln(),

@@ -121,7 +121,8 @@ pub(super) fn covariance(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(DMatrix::from_fn(p, p, |i, k| inverse[(i, k)] / (scale[i] * scale[k])))
 }
 
-/// Where the likelihood, maximised over all other parameters, has fallen by `level`²/2 on the side of the `first` step; `end`: of the search. Where it has not fallen so far there, the signed root of twice its fall at the end (0 where it cannot be had).
+/// Where the likelihood, maximised over all other parameters, has fallen by `level`²/2 on the side of the `first` step; `end`: of the search.
+/// Where it has not fallen so far, the root of twice its fall at the end (0 where it cannot be had).
 ///
 /// The signed root of the fall is nearly straight in the logarithm and is followed by secants; where it levels off, by growing steps.
 fn profile(data: &Ordinates, fit: &Fit, index: usize, [first, end]: [f64; 2], level: f64) -> Result<f64, f64> {

@@ -1,6 +1,7 @@
 //! A noise model against a log: false alarms, power, effects, and the factor between bench and vehicle.
 
 mod false_alarms;
+mod holes;
 mod inflate;
 
 use kfdesign::compare::{Comparison, Log, LogAxis, compare};
@@ -67,8 +68,13 @@ pub fn log(params: &Params, samples: u64, run: u64) -> Log {
     Log {
         quantity: params.quantity,
         sample_rate_hz: params.sample_rate_hz,
-        axes: axes.map(|(a, b)| LogAxis { name: a.name.clone(), rate: b.measured, left_out: 0 }).collect(),
+        axes: axes.map(|(a, b)| whole(&a.name, b.measured)).collect(),
     }
+}
+
+/// Of a log without holes.
+fn whole(name: &str, rate: Vec<f64>) -> LogAxis {
+    LogAxis { name: name.into(), rate, filled: 0, left_out: 0, whole: vec![] }
 }
 
 pub fn compared(model: &[Term], truth: &[Term], samples: u64, run: u64) -> Comparison {

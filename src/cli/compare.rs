@@ -36,7 +36,7 @@ pub struct Args {
     /// The log, sensor at rest, of any format that `kfdesign info` reads
     log: PathBuf,
     /// Probability of a false alarm, over all tests together
-    #[arg(long, default_value_t = 0.01, value_name = "P")]
+    #[arg(long, default_value_t = 0.01, value_name = "P", allow_negative_numbers = true)]
     alpha: f64,
     /// Identify the log too, and put every number of the file beside the log's own: its interval, the ratio, and whether it lies inside
     #[arg(long)]
@@ -86,9 +86,13 @@ pub(super) fn read(
     let parts = stretches(&recording, options.kind);
     let unit =
         parts.first().map(|p| p.unit.clone()).with_context(|| format!("{}: no axis to work on", log.display()))?;
-    parts.iter().for_each(|part| part.print_left_out("is used"));
-    let axes: Vec<LogAxis> =
-        parts.into_iter().map(|p| LogAxis { name: p.name, rate: p.rate, left_out: p.left_out }).collect();
+    let axes: Vec<LogAxis> = parts
+        .into_iter()
+        .map(|part| {
+            let at_rest = !check.moves(&part.name);
+            part.into_log_axis(at_rest)
+        })
+        .collect();
     one_for_all(&mut params, &axes);
     let log = Log { quantity: recording.quantity, sample_rate_hz: recording.sample_rate_hz, axes };
     Ok(Pair { params, log, check, sha256: recording.sha256, unit })
@@ -143,9 +147,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         result.parameters =
             parameters(&pair.params, &pair.log, &pair.unit).with_context(|| args.log.display().to_string())?;
     }
-    if pair.check.findings.iter().any(|f| f.kind == "motion") {
-        let note = "the log is not at rest all the time (see the log check): motion counts as noise here; cut it with --start/--end";
-        result.axes.iter_mut().for_each(|axis| axis.notes.push(note.into()));
+    for axis in result.axes.iter_mut().filter(|axis| pair.check.moves(&axis.log_axis)) {
+        axis.notes.push(
+            "the log is not at rest all the time (see the log check): motion counts as noise here; cut it with --start/--end"
+                .into(),
+        );
     }
     if let Some(path) = &args.output {
         let mut text = serde_json::to_string_pretty(&result)?;

@@ -202,8 +202,7 @@ struct Log {
 
 impl Log {
     fn warn_of_motion(&self, axis: &str, found: &mut Identified) {
-        let moves = |name: &Option<String>| name.as_deref().is_none_or(|name| name == axis);
-        if self.checks.iter().any(|check| check.findings.iter().any(|f| f.kind == "motion" && moves(&f.axis))) {
+        if self.checks.iter().any(|check| check.moves(axis)) {
             found.warnings.push(
                 "the log is not at rest all the time (see the log check): motion counts as drift here; cut it with --start/--end"
                     .into(),

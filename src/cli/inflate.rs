@@ -23,7 +23,7 @@ pub struct Args {
     /// A log with vibration, moving or not, of any format that `kfdesign info` reads
     log: PathBuf,
     /// Lowest frequency used, in Hz, above all motion [default: a tenth of half the sample rate]
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     from: Option<f64>,
     /// The parameters with their white noise multiplied by the factor
     #[arg(short, long, value_name = "FILE.json")]

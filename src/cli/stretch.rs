@@ -6,6 +6,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use crate::compare::LogAxis;
 use crate::filter;
 use crate::input::InputKind;
 use crate::signal::{Axis, Gap, Recording, bridge, upsets};
@@ -63,6 +64,16 @@ impl Stretch {
         // the integral would carry an outlier on
         self.phase = None;
         count
+    }
+
+    /// To hold a noise model against, with short holes filled in at rest: what a motion did in a hole is not known.
+    pub(super) fn into_log_axis(mut self, at_rest: bool) -> LogAxis {
+        if at_rest {
+            self.bridge();
+        }
+        self.print_left_out("stands for the log in curves and spectra");
+        let Stretch { name, rate, filled, left_out, whole, .. } = self;
+        LogAxis { name, rate, filled, left_out, whole }
     }
 
     /// What of the log is outside the stretch, on stderr; `role`: of the stretch.

@@ -42,7 +42,10 @@ pub struct AxisInflation {
     /// Of the parameters.
     pub name: String,
     pub log_axis: String,
+    /// Used: the longest stretch without gaps and unusable samples, or a longer one whose short holes are filled in.
     pub samples: usize,
+    pub filled: usize,
+    /// Usable samples beside them.
     pub left_out: usize,
     /// Times the wideband density of the parameters.
     pub factor: f64,
@@ -165,6 +168,7 @@ fn inflation_of(
         name: axis.name.clone(),
         log_axis: log.name.clone(),
         samples: log.rate.len(),
+        filled: log.filled,
         left_out: log.left_out,
         factor,
         interval,

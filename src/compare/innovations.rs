@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::LogAxis;
 use crate::consistency::Test;
 use crate::input::Block;
 use crate::numerics::reduce::mean;
@@ -16,7 +17,7 @@ const JUDGED: [&str; 2] = ["nis", "whiteness"];
 /// Samples handed to the filter at a time.
 const BLOCK: usize = 4096;
 
-/// Innovations of the filter that `tune` builds of the model at the log's rate.
+/// Of all samples of the log, by the filter that `tune` builds of the model at the log's rate; over a gap it predicts.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Innovations {
     pub nis: Option<Nis>,
@@ -28,9 +29,10 @@ pub(super) fn innovations(
     quantity: Quantity,
     rate_hz: f64,
     axis: &AxisParams,
-    rate: &[f64],
+    log: &LogAxis,
     alpha: f64,
 ) -> Result<(Innovations, Vec<Test>), String> {
+    let rate = &log.rate;
     let level = mean(rate);
     let spread = (rate.iter().map(|x| (x - level).powi(2)).sum::<f64>() / rate.len() as f64).sqrt();
     let unit = Unit::parse(quantity.si_unit()).map_err(|e| e.to_string())?;
@@ -42,15 +44,17 @@ pub(super) fn innovations(
     let shape = LogShape { axes: vec![name], quantity, sample_rate_hz: rate_hz, aids: 0 };
     let mut replayer =
         Replayer::new(&design, &shape, Options { alpha, ..Options::default() }).map_err(|e| e.to_string())?;
-    for (number, part) in rate.chunks(BLOCK).enumerate() {
-        let time = |k: usize| (number * BLOCK + k) as f64 / rate_hz;
-        let block = Block {
-            values: vec![part.to_vec()],
-            extra: vec![],
-            missing: vec![0; part.len()],
-            time_s: (0..part.len()).map(time).collect(),
-        };
-        replayer.push(&block, None);
+    let (mut first, mut before) = (0.0, 0);
+    for piece in log.pieces() {
+        before += piece.missing;
+        for part in piece.samples.chunks(BLOCK) {
+            first += before as f64;
+            let mut missing = vec![0; part.len()];
+            missing[0] = std::mem::take(&mut before);
+            let time_s = (0..part.len()).map(|k| (first + k as f64) / rate_hz).collect();
+            replayer.push(&Block { values: vec![part.to_vec()], extra: vec![], missing, time_s }, None);
+            first += part.len() as f64;
+        }
     }
     let result = replayer.finish();
     let tests = result.tests.into_iter().filter(|t| JUDGED.contains(&t.name.as_str())).collect();

@@ -17,7 +17,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::consistency::{Test, Verdict, effect};
-use crate::noise::{NoiseModel, Term};
+use crate::filter::likelihood::Stretch;
+use crate::noise::{Kind, NoiseModel, Term};
 use crate::params::{AxisParams, Params};
 use crate::replay::axes::{RATE_TOLERANCE, partners};
 use crate::units::{Quantity, digits};
@@ -33,13 +34,28 @@ pub const FEWEST_SAMPLES: usize = 100;
 /// A drift is seen when it is at least this share of the model's Allan variance at the longest averaging time.
 const DRIFT_SHARE: f64 = 0.5;
 
-/// One axis of a log: uniform, finite, SI.
+/// One axis of a log, SI.
 #[derive(Clone, Debug)]
 pub struct LogAxis {
     pub name: String,
+    /// Uniform and finite: what curves and spectra are made of.
     pub rate: Vec<f64>,
-    /// Samples of the log that are not in `rate`.
+    /// How many of `rate` were missing and are filled in.
+    pub filled: usize,
+    /// Usable samples of the log that are not in `rate`.
     pub left_out: usize,
+    /// Piece by piece, how many samples are missing before it, then its samples, of which some may not be finite; empty where `rate` is all of the log.
+    pub whole: Vec<(u64, Vec<f64>)>,
+}
+
+impl LogAxis {
+    /// All of the log.
+    fn pieces(&self) -> Vec<Stretch<'_>> {
+        match &self.whole[..] {
+            [] => vec![Stretch { missing: 0, samples: &self.rate }],
+            whole => whole.iter().map(|(missing, samples)| Stretch { missing: *missing, samples }).collect(),
+        }
+    }
 }
 
 /// A log at rest.
@@ -72,12 +88,14 @@ pub struct AxisComparison {
     /// Of the parameters.
     pub name: String,
     pub log_axis: String,
-    /// Samples used: the longest stretch without gaps and unusable samples.
+    /// Of which curve, spectrum and mean are: the longest stretch without gaps and unusable samples, or a longer one whose short holes are filled in.
     pub samples: usize,
+    pub filled: usize,
+    /// Usable samples beside them.
     pub left_out: usize,
     pub allan: AllanEnvelope,
     pub spectrum: Vec<Band>,
-    /// Absent when no filter can be built of the model; a note says why.
+    /// Of all samples of the log. Absent when no filter can be built of the model; a note says why.
     pub innovations: Option<Innovations>,
     pub means: Means,
     /// What could not be compared, or only with care.
@@ -212,12 +230,13 @@ fn compare_axis(
 ) -> Result<(AxisComparison, Vec<Test>), CompareError> {
     let (dt, model, name) = (1.0 / rate_hz, axis.noise(), axis.name.as_str());
     let mut notes = other_rate(params.sample_rate_hz, rate_hz, &model).into_iter().collect::<Vec<String>>();
+    notes.extend(of_neighbours(&model, log));
     let (allan, test) = curve::allan_curve(name, &log.rate, dt, &model, alpha)?;
     let mut tests = vec![test];
     let ratios = spectrum::Ratios::new(&log.rate, dt, &model, 0.0);
     let (spectrum, of_spectrum) = spectrum::spectrum(name, &ratios, alpha);
     tests.extend(of_spectrum);
-    let innovations = match innovations::innovations(params.quantity, rate_hz, axis, &log.rate, alpha) {
+    let innovations = match innovations::innovations(params.quantity, rate_hz, axis, log, alpha) {
         Ok((innovations, of_filter)) => {
             tests.extend(of_filter);
             Some(innovations)
@@ -232,6 +251,7 @@ fn compare_axis(
         name: name.into(),
         log_axis: log.name.clone(),
         samples: log.rate.len(),
+        filled: log.filled,
         left_out: log.left_out,
         allan,
         spectrum,
@@ -240,6 +260,18 @@ fn compare_axis(
         notes,
     };
     Ok((comparison, tests))
+}
+
+/// What is filled in follows its neighbours in level alone: what that changes.
+fn of_neighbours(model: &NoiseModel, log: &LogAxis) -> Option<String> {
+    let tied = |kind: Kind| matches!(kind, Kind::MovingAverage | Kind::Oscillation | Kind::Quantization);
+    (log.filled > 0 && model.terms.iter().any(|term| tied(term.kind()))).then(|| {
+        format!(
+            "{} % of the samples are filled in and are not tied to their neighbours as averages, lines and quantisation are: differences where the model has little power may come from that; \
+             nis and whiteness are of the samples that are there",
+            digits(100.0 * log.filled as f64 / log.rate.len() as f64)
+        )
+    })
 }
 
 /// What another sample rate changes: terms that count samples are other processes at another rate, all others are continuous.

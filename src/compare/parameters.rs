@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{CompareError, Log, LogAxis, paired};
-use crate::identify::{Identified, Method, ModelChoice, Sum, counts_as_white, identify_axis};
+use crate::identify::{Identified, ModelChoice, Sum, counts_as_white, identify_logs};
 use crate::noise::{Kind, Term};
 use crate::params::{AxisParams, Measured, Params, TermEntry};
 use crate::units::{Unit, digits};
@@ -60,7 +60,7 @@ struct Estimate {
 
 fn of_axis(axis: &AxisParams, log: &LogAxis, dt: f64, display: &Unit) -> Result<Vec<Beside>, CompareError> {
     let identify = |choice: &ModelChoice| {
-        let found = identify_axis(&axis.name, &log.rate, dt, display, Method::Likelihood, choice);
+        let found = identify_logs(&axis.name, &[&log.rate], &[log.pieces()], dt, display, choice);
         found.map_err(|e| CompareError::Axis { axis: log.name.clone(), message: e.to_string() })
     };
     let mut file = axis.clone();

@@ -77,6 +77,13 @@ pub struct LogCheck {
     pub findings: Vec<Finding>,
 }
 
+impl LogCheck {
+    /// The axis, or the log as a whole, was found not to be at rest.
+    pub fn moves(&self, axis: &str) -> bool {
+        self.findings.iter().any(|f| f.kind == "motion" && f.axis.as_deref().is_none_or(|name| name == axis))
+    }
+}
+
 /// What the values of a log are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum InputKind {

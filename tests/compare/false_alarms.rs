@@ -1,10 +1,12 @@
 //! How often a true model is rejected.
 
+use kfdesign::compare::{Comparison, compare};
 use kfdesign::consistency::Verdict;
 use kfdesign::noise::Term;
 use rayon::prelude::*;
 
-use super::compared;
+use super::holes::{three_in_a_hundred, with_holes};
+use super::{compared, log, params};
 
 const WHITE: Term = Term::White { density: 0.1 };
 
@@ -32,9 +34,23 @@ fn models() -> Vec<(&'static str, Vec<Term>)> {
 #[test]
 #[ignore = "a study of minutes; its table is in docs/validation.md"]
 fn false_alarms_of_compare() {
+    study(|model, run| compared(model, model, 6000, run));
+}
+
+/// The same beside holes.
+#[test]
+#[ignore = "a study of minutes; its result is in docs/validation.md"]
+fn false_alarms_beside_holes() {
+    study(|model, run| {
+        let log = with_holes(log(&params(model), 6000, run), three_in_a_hundred);
+        compare(&params(model), &log, 0.01).unwrap()
+    });
+}
+
+fn study(of: impl Fn(&[Term], u64) -> Comparison + Sync) {
     const LOGS: u64 = 1000;
     for (name, model) in models() {
-        let results: Vec<_> = (0..LOGS).into_par_iter().map(|run| compared(&model, &model, 6000, run)).collect();
+        let results: Vec<_> = (0..LOGS).into_par_iter().map(|run| of(&model, run)).collect();
         let share =
             |hit: &dyn Fn(usize) -> bool| 100.0 * (0..results.len()).filter(|i| hit(*i)).count() as f64 / LOGS as f64;
         let tests = results[0].tests.iter().enumerate().map(|(k, test)| {

@@ -15,7 +15,7 @@ use super::{
 };
 use crate::allan::{self, AllanCurve, Deviation, TauGrid};
 use crate::noise::{Kind, NoiseModel, Term};
-use crate::numerics::distribution::NORMAL_95;
+use crate::numerics::distribution::{NORMAL_90, NORMAL_95};
 use crate::numerics::reduce::mean;
 use crate::params::{AxisParams, NotIdentified};
 use crate::units::{Unit, digits};
@@ -364,10 +364,10 @@ impl Words<'_> {
     }
 }
 
-/// The coefficient of a term that raises χ² by 2.706 (one-sided 95 %) over the fit without it.
+/// The coefficient of a term that raises χ² by [`NORMAL_90`]² (one-sided 95 %) over the fit without it.
 fn largest_tolerated(points: &Points, fit: &Fit, kind: Kind) -> Option<f64> {
     let excess = |log_coefficient: f64| {
-        tolerated(points, fit, kind, log_coefficient).map(|chi_square| chi_square - fit.chi_square - 2.706)
+        tolerated(points, fit, kind, log_coefficient).map(|chi_square| chi_square - fit.chi_square - NORMAL_90.powi(2))
     };
     // where the term alone reaches the model's variance at the longest averaging time; far too much
     let longest = *points.factors().last()?;

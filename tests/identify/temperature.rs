@@ -141,7 +141,7 @@ fn counted(runs: u64) -> [u64; 2] {
         let none = alone(&z, t.clone(), None, "white+gm").1.unwrap();
         z.iter_mut().zip(&t).for_each(|(z, t)| *z += K * t);
         let some = alone(&z, t, None, "white+gm").1.unwrap();
-        let [low, high] = some.interval();
+        let [low, high] = some.interval;
         [u64::from(low < K && K < high), u64::from(none.p_value < 0.05)]
     };
     (0..runs).map(one).fold([0, 0], |[a, b], [c, d]| [a + c, b + d])
@@ -159,6 +159,37 @@ fn known_coefficient_is_in_its_interval() {
 #[ignore = "a study"]
 fn temperature_study() {
     println!("covered, false alarms of {}: {:?}", study_runs(), counted(study_runs()));
+}
+
+/// A random walk that a rising temperature may take the place of, though k is zero. Zero is in the interval where p says that it may be: both are of the same likelihood, on the cosine
+/// coefficients and exact, which differ by less than from 0.03 to 0.08 in p.
+#[test]
+fn interval_and_p_value_say_the_same() {
+    let [mut inside, mut outside, mut replaced] = [0; 3];
+    for run in 0..100 {
+        let walk = Term::RateRandomWalk { density: 0.002 };
+        let z = log(&[white(0.2), walk], 600, 1.0, 96, run);
+        let t: Vec<f64> = (0..600).map(|i| warming(2.0 * f64::from(i))).collect();
+        let effect = alone(&z, t, None, "white+rrw").1.unwrap();
+        let [low, high] = effect.interval;
+        let holds_zero = low < 0.0 && 0.0 < high;
+        assert!(low < effect.coefficient && effect.coefficient < high);
+        let parameter = &effect.parameters[1];
+        let gone = parameter.with.si() < 0.2 * parameter.without.si();
+        match effect.p_value {
+            p if p > 0.08 => {
+                assert!(holds_zero, "run {run}: {effect:?}");
+                inside += 1;
+                replaced += usize::from(gone && effect.coefficient.abs() > 1.96 * effect.sigma);
+            }
+            p if p < 0.03 => {
+                assert!(!holds_zero, "run {run}: {effect:?}");
+                outside += 1;
+            }
+            _ => {}
+        }
+    }
+    assert!(inside >= 20 && outside >= 3 && replaced >= 3, "{inside} {outside} {replaced}");
 }
 
 /// All drift of the log is that of the temperature: with the regression nothing is left of it, and its limit is below what was there.

@@ -133,7 +133,7 @@ struct PairDocument<'a> {
 
 impl Shown {
     fn coefficient(&self, found: &Effect) -> Measured {
-        Measured::from_si(found.coefficient, Some(found.interval()), self.per.clone())
+        Measured::from_si(found.coefficient, Some(found.interval), self.per.clone())
     }
 
     /// As params.json has it.

@@ -68,38 +68,41 @@ pub(super) fn precisions(data: &Ordinates, fit: &Fit) -> Vec<Precision> {
     for std_dev in endless(&fit.form, &known) {
         let step = first_step(known[std_dev].sigma, known[std_dev].bound, ROUGH[0]);
         known[std_dev].lower = profile(data, fit, std_dev, [-step, bounds[std_dev].0], NORMAL_99).ok();
-        known[std_dev].upper = None;
     }
-    known
+    keep_open(&fit.form, known)
 }
 
-/// Numbers of σ of the Gauss-Markov processes whose correlation time has a lower limit and no upper one: σ, which grows with it, has no upper limit
-/// either (the end of the search is none), and its lower one is that of 99 %, because that of 95 % is right in 90 % of the logs in which it is the only one
-/// (docs/validation.md).
-fn endless(form: &Form, known: &[Precision]) -> Vec<usize> {
-    let open = |[_, time]: &[usize; 2]| known[*time].upper.is_none() && known[*time].lower.is_some();
-    gauss_markov(form).into_iter().filter(open).map(|[std_dev, _]| std_dev).collect()
+/// Numbers of σ of the Gauss-Markov processes whose correlation time has a lower limit and no upper one. Their lower limit is that of 99 %, because that of 95 % is right in 90 % of
+/// the logs in which it is the only one (docs/validation.md).
+pub(super) fn endless(form: &Form, known: &[Precision]) -> Vec<usize> {
+    std_devs_of_endless(form, known, Piece::GaussMarkov)
 }
 
-/// `known` after a step of the search, with no upper limit of what had none before.
+/// `known` without upper limits of σ where the correlation time has none: σ grows with it, and the end of the search is no limit.
 pub(super) fn keep_open(form: &Form, mut known: Vec<Precision>) -> Vec<Precision> {
-    for std_dev in endless(form, &known) {
-        known[std_dev].upper = None;
+    for piece in [Piece::GaussMarkov, Piece::Oscillation] {
+        for std_dev in std_devs_of_endless(form, &known, piece) {
+            known[std_dev].upper = None;
+        }
     }
     known
+}
+
+fn std_devs_of_endless(form: &Form, known: &[Precision], piece: Piece) -> Vec<usize> {
+    let open = |[_, time]: &[usize; 2]| known[*time].upper.is_none() && known[*time].lower.is_some();
+    processes(form, piece).into_iter().filter(open).map(|[std_dev, _]| std_dev).collect()
 }
 
 fn first_step(sigma: f64, bound: f64, shortest: f64) -> f64 {
     [sigma, bound].into_iter().filter(|s| s.is_finite()).fold(shortest, f64::max).min(2.0)
 }
 
-/// Numbers of σ and Tc of every Gauss-Markov process.
-pub(super) fn gauss_markov(form: &Form) -> Vec<[usize; 2]> {
-    let pieces = form.pieces();
-    let is_time = |(_, (piece, role)): &(usize, (usize, Role))| {
-        pieces[*piece] == Piece::GaussMarkov && *role == Role::CorrelationTime
-    };
-    form.roles().into_iter().enumerate().filter(is_time).map(|(i, _)| [i - 1, i]).collect()
+/// Numbers of σ and Tc of every process that is such a piece: its first parameter and its last.
+pub(super) fn processes(form: &Form, piece: Piece) -> Vec<[usize; 2]> {
+    let is_time =
+        |(_, (of, role)): &(usize, (usize, Role))| form.pieces()[*of] == piece && *role == Role::CorrelationTime;
+    let before = piece.roles().len() - 1;
+    form.roles().into_iter().enumerate().filter(is_time).map(|(i, _)| [i - before, i]).collect()
 }
 
 /// Standard deviations that belong to an information matrix.
@@ -161,4 +164,59 @@ fn profile(data: &Ordinates, fit: &Fit, index: usize, [first, end]: [f64; 2], le
         };
     }
     far.map_or(Err(before), |_| Ok(at))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numerics::random::{StreamId, normal, stream};
+
+    /// 600 samples of a Gauss-Markov process of σ 0.3 and 50 samples, in white noise of 1.
+    fn fitted(run: u64) -> (Ordinates, Fit) {
+        let mut rng = stream(48, StreamId { run, axis: 0, term: 0 });
+        let (phi, mut drift) = ((-1.0 / 50.0_f64).exp(), 0.3 * normal(&mut rng));
+        let sample = |_| {
+            drift = phi * drift + 0.3 * (1.0 - phi * phi).sqrt() * normal(&mut rng);
+            drift + normal(&mut rng)
+        };
+        let rate: Vec<f64> = (0..600).map(sample).collect();
+        let data = Ordinates::new(&rate, 1.0, Some(&[]));
+        let form = Form::new(vec![Piece::White, Piece::GaussMarkov]);
+        let fit = whittle::climb_all(&data, &form, &[0.0, 0.3_f64.ln(), 50.0_f64.ln()]).unwrap();
+        (data, fit)
+    }
+
+    /// Where a limit stands, the likelihood, at its maximum over all other parameters, has fallen by half of 1.96², of σ beside a correlation time without an upper limit by half of
+    /// 2.576² (the search ends within 0.01 of the root; a parabola's limits are not looked at).
+    #[test]
+    fn limits_are_where_the_likelihood_has_fallen() {
+        let [mut open, mut closed] = [0; 2];
+        for run in 0..60 {
+            let (data, fit) = fitted(run);
+            let known = precisions(&data, &fit);
+            let root = |index: usize, at: f64| {
+                let mut start = fit.logs.clone();
+                start[index] = at;
+                let free: Vec<usize> = (0..3).filter(|i| *i != index).collect();
+                let held = whittle::climb(&data, &fit.form, &start, &free).unwrap();
+                (2.0 * (fit.log_likelihood - held.log_likelihood)).sqrt()
+            };
+            let [std_dev, time] = processes(&fit.form, Piece::GaussMarkov)[0];
+            let (Some(low), Some(shortest)) = (known[std_dev].lower, known[time].lower) else { continue };
+            let level = if known[time].upper.is_none() { NORMAL_99 } else { NORMAL_95 };
+            assert!((root(std_dev, low) - level).abs() < 0.02, "run {run}: {}", root(std_dev, low));
+            assert!((root(time, shortest) - NORMAL_95).abs() < 0.02, "run {run}: {}", root(time, shortest));
+            match known[time].upper {
+                None => {
+                    assert_eq!(known[std_dev].upper, None);
+                    open += 1;
+                }
+                Some(longest) => {
+                    assert!((root(time, longest) - NORMAL_95).abs() < 0.02, "run {run}: {}", root(time, longest));
+                    closed += 1;
+                }
+            }
+        }
+        assert!(open >= 5 && closed >= 5, "{open} {closed}");
+    }
 }

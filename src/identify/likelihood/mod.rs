@@ -320,13 +320,15 @@ fn moved(
     let samples: usize = logs.iter().flatten().map(|part| part.samples.len()).sum();
     let more = samples as f64 * data.dt / data.total_s();
     let sigmas = refined.information.clone().map(interval::deviations);
+    let endless = interval::endless(&before.form, known);
     let of = |(i, old): (usize, &Precision)| {
         let (from, to) = (before.logs[i], refined.logs[i]);
         let sigma = sigmas.as_ref().map_or(old.sigma, |all| all[i]);
         let parabola = old.sigma < PARABOLA;
         let shrunk = if old.sigma.is_finite() { (sigma / old.sigma).min(1.0) } else { 1.0 };
         let limit = |old: Option<f64>, side: f64| match old {
-            _ if sigmas.is_some() && sigma < PARABOLA => Some(to + side * NORMAL_95 * sigma),
+            // of another level where the correlation time has no end
+            _ if sigmas.is_some() && sigma < PARABOLA && !endless.contains(&i) => Some(to + side * NORMAL_95 * sigma),
             old if parabola => old.map(|old| to + (old - from) * shrunk),
             // where the likelihood is flat its maximum moves far, its limits do not; one that it has passed is none
             old => old.filter(|old| side * (old - to) > 0.0),

@@ -11,6 +11,8 @@ use crate::signal::lines::{Line, find_lines};
 const ALONE: usize = 32;
 /// Relative width of a bin above.
 const WIDTH: f64 = 1.0 / 40.0;
+/// A log with more of its power than this at one frequency is a sinusoid.
+const TONE: f64 = 0.98;
 /// A line's surroundings are binned this finely: each bin is at most this share of its distance from the line.
 const LINE_WIDTH: f64 = 0.25;
 
@@ -150,8 +152,8 @@ impl Ordinates {
         (low.min(frequency_hz), high.max(frequency_hz), self.bins[at].count / self.windows * step)
     }
 
-    /// The frequency with most power among those above the coefficients that stand alone, and the share of all power there: within 32 coefficients, beyond which a
-    /// sinusoid has less than 1 % of its own.
+    /// Of a log that is a sinusoid: the frequency with most power among those above the coefficients that stand alone, and the share of all power there, within 32
+    /// coefficients, beyond which a sinusoid has less than 1 % of its own.
     pub(super) fn tone(&self) -> Option<(f64, f64)> {
         let step = 1.0 / (2.0 * self.span_s());
         let density = |bin: &&Bin| bin.power / bin.count;
@@ -161,7 +163,7 @@ impl Ordinates {
         let all: f64 = self.bins.iter().map(|bin| bin.power).sum();
         let own =
             self.bins.iter().filter(near).fold((0.0, 0.0), |(p, f), b| (p + b.power, f + b.power * b.frequency_hz));
-        Some((own.1 / own.0, own.0 / all))
+        Some((own.1 / own.0, own.0 / all)).filter(|(_, share)| *share > TONE)
     }
 
     /// Length of the log, or of each of its windows, s.

@@ -42,6 +42,8 @@ pub fn recent(rate: &[f64], dt: f64, fitted: &Fitted) -> Option<Recent> {
     let before = (rate.len() as f64 * FITTED_SHARE) as usize;
     let lines = &fitted.lines;
     let late = Ordinates::new(&rate[before..], dt, Some(lines));
+    // that a tone goes on is no matter of noise that changes
+    late.tone().is_none().then_some(())?;
     let told = |step: usize| {
         let start = before * step / STEPS;
         let early = Ordinates::new(&rate[start..before], dt, Some(lines));

@@ -40,9 +40,9 @@ const BLOCK_S: f64 = 1.0;
 /// Turns of the search at most; it ends when k moves by less than this many standard deviations.
 const TURNS: usize = 6;
 const STILL: f64 = 0.02;
-/// Degrees of freedom of the noise: at most, for practical purposes a known noise, and at least.
-const MOST_FREEDOM: f64 = 1e6;
-const FEWEST_FREEDOM: f64 = 2.0;
+/// Places that are tried for an end of the interval, and how near one must come, in standard deviations.
+const PLACES: usize = 40;
+const NEAR: f64 = 0.02;
 /// Share of the information on k that a ramp may leave for the two to be told apart.
 const LEAST_LEFT: f64 = 1e-6;
 
@@ -97,8 +97,8 @@ pub struct Effect {
     /// k, and its standard deviation under the noise as it was found.
     pub coefficient: f64,
     pub sigma: f64,
-    /// Of the 95 % interval, where 2 ln L, the noise at its best for every k, has fallen by χ²₁(0.95): wider than 1.96 sigma, for the noise is not known.
-    pub half_width: f64,
+    /// 95 %: between where 2 ln L, the noise at its best for every k, has fallen by χ²₁(0.95). Wider than 1.96 sigma, for the noise is not known.
+    pub interval: [f64; 2],
     /// 2 Δ ln L between the model with and without k, each at its best parameters; χ² with one degree of freedom if k is zero.
     pub likelihood_ratio: f64,
     pub p_value: f64,
@@ -115,13 +115,6 @@ pub struct Pair {
     pub parameter: String,
     pub without: Measured,
     pub with: Measured,
-}
-
-impl Effect {
-    /// 95 %.
-    pub fn interval(&self) -> [f64; 2] {
-        [-1.0, 1.0].map(|side| self.coefficient + side * self.half_width)
-    }
 }
 
 /// The effect of the temperature on an axis of which `fitted` is the model; `rate`, `logs`, `dt` and `display` as for `identify`.
@@ -157,18 +150,18 @@ pub fn effect(
     let before = data.less(Line { coefficient: 0.0, ..line }).noise(&fitted.fit).ok_or_else(failed)?;
     let step = fitted.fit.logs.iter().zip(&before.logs).map(|(exact, near)| exact - near);
     let start = Fit { logs: near.logs.iter().zip(step).map(|(near, step)| near + step).collect(), ..near.clone() };
-    let freedom = data.freedom(line, &near);
     let with = data.less(line).refined(&near, &start);
     let model = data.model(&with.fit).ok_or_else(failed)?;
     let line = data.line(&model)?;
     let value = total(&data.each(&model, &temperature.logs, |z, t| z - line.coefficient * t));
+    let interval = data.interval(line, [&near, &before]).ok_or_else(failed)?;
     let likelihood_ratio = (2.0 * (value - total(&data.each(&alone, &temperature.logs, |z, _| z)))).max(0.0);
     let mut parameters = pairs(fitted, &with, display);
     parameters.extend(data.turn_on([&alone, &model], line, display));
     Ok(Effect {
         coefficient: line.coefficient,
         sigma: line.sigma,
-        half_width: line.sigma * (freedom * (NORMAL_95 * NORMAL_95 / freedom).exp_m1()).sqrt(),
+        interval,
         likelihood_ratio,
         p_value: chi_square_sf(likelihood_ratio, 1.0),
         reliability: data.reliability(&model),
@@ -273,28 +266,35 @@ impl Data<'_> {
         (squares[0] / squares[1]).sqrt()
     }
 
-    /// Degrees of freedom ν that the noise has where it stands in the way of k: as for a line through samples of unknown variance, 2 ln L falls by
-    /// ν ln(1 + z²/ν) at z standard deviations where the noise is at its best for every k, and by z² where it is held. Both are taken at two standard deviations
-    /// on either side, on the cosine coefficients of the longest stretch.
-    fn freedom(&self, line: Line, near: &Fit) -> f64 {
-        let top = whittle::log_likelihood(&self.less(line).data, &near.form, &near.logs);
-        let falls: Vec<[f64; 2]> = [-2.0, 2.0]
-            .into_par_iter()
-            .filter_map(|z| {
-                let less = self.less(Line { coefficient: line.coefficient + z * line.sigma, ..line });
-                let held = whittle::log_likelihood(&less.data, &near.form, &near.logs);
-                let free = whittle::climb_all(&less.data, &near.form, &near.logs)?.log_likelihood;
-                Some([2.0 * (top - held), 2.0 * (top - free)])
-            })
-            .collect();
-        let [held, free] = [0, 1].map(|i| mean(&falls.iter().map(|fall| fall[i]).collect::<Vec<f64>>()));
-        let (mut low, mut high) = (FEWEST_FREEDOM.ln(), MOST_FREEDOM.ln());
-        for _ in 0..40 {
-            let middle: f64 = 0.5 * (low + high);
-            let freedom = middle.exp();
-            if freedom * (held / freedom).ln_1p() < free { low = middle } else { high = middle }
-        }
-        high.exp()
+    /// Where, to both sides of k, 2 ln L has fallen by χ²₁(0.95) from its value there, on the cosine coefficients of the longest stretch, the noise at its best for every k:
+    /// searched from each of `noise`, that of the model with k and that without, for drift that k took the place of may be there all the same.
+    fn interval(&self, line: Line, noise: [&Fit; 2]) -> Option<[f64; 2]> {
+        let value = |z: f64| {
+            let less = self.less(Line { coefficient: line.coefficient + z * line.sigma, ..line });
+            let found = noise.par_iter().filter_map(|from| less.noise(from));
+            found.map(|fit| fit.log_likelihood).max_by(f64::total_cmp)
+        };
+        let top = value(0.0)?;
+        let limit = |side: f64| {
+            let (mut at, mut near, mut far) = (2.0, 0.0, f64::INFINITY);
+            for _ in 0..PLACES {
+                let root = (2.0 * (top - value(side * at)?)).max(0.0).sqrt();
+                if (root - NORMAL_95).abs() < NEAR || far - near < NEAR {
+                    return Some(line.coefficient + side * at * line.sigma);
+                }
+                if root < NORMAL_95 {
+                    near = at
+                } else {
+                    far = at
+                }
+                // the root of the fall is nearly straight; where it levels off, by growing steps
+                let straight = at * (NORMAL_95 / root.max(0.3)).max(if far.is_finite() { 0.0 } else { 1.2 });
+                at = if straight > near && straight < far { straight } else { 0.5 * (near + far) };
+            }
+            None
+        };
+        let (low, high) = rayon::join(|| limit(-1.0), || limit(1.0));
+        Some([low?, high?])
     }
 
     fn reliability(&self, model: &LinearModel) -> Option<f64> {

@@ -6,7 +6,7 @@ use super::super::{LENGTHS_TO_TELL, WIDEST_INTERVAL, coefficient_unit, worth_rec
 use super::CLOSE;
 use super::form::Piece;
 use super::growth::score;
-use super::interval::{Precision, gauss_markov};
+use super::interval::{Precision, processes};
 use super::names::{name_of, unit_of};
 use super::ordinates::Ordinates;
 use super::whittle::{self, Fit};
@@ -14,9 +14,6 @@ use crate::noise::{Kind, Term};
 use crate::numerics::distribution::{NORMAL_90, NORMAL_95};
 use crate::params::NotIdentified;
 use crate::units::{Unit, digits};
-
-/// A log with more of its power than this at one frequency is a sinusoid.
-const TONE: f64 = 0.98;
 
 /// Sentences about one axis, numbers in the unit of the log.
 pub(super) struct Words<'a> {
@@ -59,7 +56,7 @@ impl Words<'_> {
         // widths shrink like T^(−1/2)
         let needed = self.data.total_s() * (2.0 * NORMAL_95 * known.bound / WIDEST_INTERVAL.ln()).powi(2);
         // and a correlation time without end is told from a random walk by more of them
-        let time = gauss_markov(&fit.form)
+        let time = processes(&fit.form, Piece::GaussMarkov)
             .into_iter()
             .find(|pair| known.upper.is_none() && pair.contains(&index))
             .map(|[_, time]| fit.logs[time].exp());
@@ -161,7 +158,7 @@ impl Words<'_> {
                 digits(0.5 * fit.decrement)
             ));
         }
-        if let Some((frequency, share)) = self.data.tone().filter(|(_, share)| *share > TONE) {
+        if let Some((frequency, share)) = self.data.tone() {
             warnings.push(format!(
                 "{} % of the power is at {} Hz: a sinusoid, not noise; is the sensor at rest?",
                 digits(100.0 * share),

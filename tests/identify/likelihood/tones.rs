@@ -20,8 +20,8 @@ fn oscillation(found: &Identified) -> [f64; 2] {
         .expect("a line")
 }
 
-/// 0.5 sin(2π 12.3456 Hz t) has the standard deviation 0.354 and no end, and no line of finite correlation time is that: what is found is the nearest one, within a factor of 1.5, and
-/// stands inside its own interval. Of the correlation time a lower limit is told; and what is said of drift is what the same noise without the tone says, within a factor of 2.
+/// 0.5 sin(2π 12.3456 Hz t) has the standard deviation 0.354 and no end, and no line of finite correlation time is that: what is found is the nearest one, within a factor of 1.5.
+/// Of the correlation time a lower limit is told, so of the standard deviation, which grows with it, too; and what is said of drift is what the same noise without the tone says, within a factor of 2.
 #[test]
 fn a_steady_tone_is_a_line_without_an_end() {
     let dt = 0.01;
@@ -35,7 +35,8 @@ fn a_steady_tone_is_a_line_without_an_end() {
         _ => None,
     });
     let [low, high] = line.unwrap();
-    assert!(low < sigma && sigma < high && (0.2357..0.53).contains(&sigma), "{low} {sigma} {high}");
+    assert!(low < sigma.min(0.3536) && high.is_infinite(), "{low} {sigma} {high}");
+    assert!((0.2357..0.53).contains(&sigma), "{sigma}");
     assert!(time > 60.0, "{time}");
     let said = |found: &Identified, term: &str| {
         let entry = found.not_identified.iter().find(|entry| entry.term == term);

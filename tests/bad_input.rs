@@ -63,6 +63,14 @@ fn a_log_that_cannot_be_read() {
         ("empty file", "log.csv", vec![], run, &["log.csv: the file is empty"]),
         ("header only", "log.csv", format!("{HEADER}\n").into_bytes(), run, &["log.csv: line 1", "no row of numbers"]),
         ("comments only", "log.csv", b"# nothing\n# here\n".to_vec(), run, &["log.csv: no data"]),
+        (
+            "a negative rate",
+            "log.csv",
+            log(HEADER, 99, ""),
+            "allan log.csv --rate -100",
+            &["--rate must be a positive number of Hz"],
+        ),
+        ("a negative start", "log.csv", log(HEADER, 99, ""), "allan log.csv --start -5", &["--start", "0 or more"]),
         ("prose", "log.csv", b"It was a dark\nand stormy night.\n".to_vec(), run, &["log.csv: no rows of numbers"]),
         (
             "text in a number column",

@@ -499,7 +499,10 @@ fn the_command_refuses_what_it_cannot_tune() {
         ("tune quiet.json -o quiet.json", "it is the input file"),
         ("tune none.json -o filter.json", "none.json: cannot read"),
         ("tune quiet.json --plant rocket", "unknown plant 'rocket'"),
-        ("tune quiet.json --flicker-horizon -3", "unexpected argument"),
+        (
+            "tune quiet.json --flicker-horizon -3",
+            "quiet.json: axis 'x': horizon is -3; expected a number greater than zero\n",
+        ),
     ] {
         let out = bench.run(args);
         assert_eq!(out.status, 2, "{args}: {}", out.stdout);

@@ -34,10 +34,10 @@ pub struct Args {
     #[arg(long, value_name = "PARAMS")]
     accelerometer: Option<PathBuf>,
     /// Rate of the log that the program will read, or of its filter's steps, in Hz [default: that of the parameters; px4: 100, ardupilot: 83.3]
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     rate: Option<f64>,
     /// Multiply every white density and every drift; written beside the identified numbers
-    #[arg(long, value_name = "FACTOR")]
+    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
     inflate: Option<f64>,
     /// Where the file has one number for three axes: worst, mean (root mean square) or the name of an axis [default: worst]. c, rust: the one axis
     /// to write [default: all]

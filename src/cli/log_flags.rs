@@ -23,13 +23,13 @@ pub struct LogFlags {
     #[arg(long, value_name = "UNIT")]
     pub unit: Option<String>,
     /// Sample rate in Hz if there is no time column; with one, it replaces the stamps
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub rate: Option<f64>,
     /// Skip the first seconds
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub start: Option<f64>,
     /// Stop at this time, seconds from the start of the log
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub end: Option<f64>,
     /// What the values are
     #[arg(long, value_enum, default_value_t = InputArg::Rate)]

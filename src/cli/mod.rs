@@ -114,10 +114,21 @@ pub fn main() -> ExitCode {
         Ok(Status::CheckFailed) => ExitCode::from(1),
         Err(error) if output::is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("kfdesign: {error:#}");
+            eprintln!("kfdesign: {}", in_one_line(&error));
             ExitCode::from(2)
         }
     }
+}
+
+/// The error with its causes, each once: many say theirs themselves.
+fn in_one_line(error: &anyhow::Error) -> String {
+    let mut said: Vec<String> = Vec::new();
+    for cause in error.chain().map(ToString::to_string) {
+        if !said.iter().any(|text| text.contains(&cause)) {
+            said.push(cause);
+        }
+    }
+    said.join(": ")
 }
 
 /// clap's message as one line: what was found and what is expected, without the usage block.

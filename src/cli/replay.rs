@@ -14,7 +14,7 @@ use super::flags::with_unit;
 use super::log_flags::{LogFlags, print_check};
 use super::output::{digits, print_json, print_text, progress, shown_unit, table};
 use super::tests_table::{TESTS, caption, rows};
-use crate::consistency::Verdict;
+use crate::consistency::{Test, Verdict};
 use crate::export::atomic::{AtomicFile, refuse_input_as_output};
 use crate::export::table::TableWriter;
 use crate::filter::{AttitudeDesign, FilterDesign, Form};
@@ -44,14 +44,14 @@ pub struct Args {
     #[arg(long, requires = "output", conflicts_with = "innovations")]
     smooth: bool,
     /// Probability of a false alarm, over all tests together
-    #[arg(long, default_value_t = 0.01, value_name = "P")]
+    #[arg(long, default_value_t = 0.01, value_name = "P", allow_negative_numbers = true)]
     alpha: f64,
     /// Reject samples whose innovation is further out than this many sigmas
-    #[arg(long, value_name = "SIGMAS")]
+    #[arg(long, value_name = "SIGMAS", allow_negative_numbers = true)]
     gate: Option<f64>,
     /// Samples further out than this many sigmas count as outliers: they move the estimate as far as one at that distance would, and are
     /// not judged (Masreliez and Martin 1977)
-    #[arg(long, value_name = "SIGMAS", conflicts_with_all = ["gate", "smooth"])]
+    #[arg(long, value_name = "SIGMAS", conflicts_with_all = ["gate", "smooth"], allow_negative_numbers = true)]
     robust: Option<f64>,
     /// How the filter carries its covariance
     #[arg(long, value_enum, default_value_t = FormFlag::Joseph, conflicts_with = "smooth")]
@@ -134,6 +134,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     result.log = Some(name);
     result.log_sha256 = Some(reader.sha256().to_string());
     say_rates(&design, &result);
+    if design.plant == "static" && check.findings.iter().all(|finding| finding.kind != "motion") {
+        say_follow(args, &result);
+    }
     let unit = reader.axes().first().map(|a| a.unit.clone());
     if let Some(mut file) = plot {
         file.write_all(sight::sheet(&result, unit.as_ref()).as_bytes()).context("plot")?;
@@ -170,6 +173,19 @@ fn say_rates(design: &FilterDesign, result: &ReplayResult) {
                 axis.samples
             );
         }
+    }
+}
+
+/// One line on stderr when the wideband noise of a log at rest is not that of the design.
+fn say_follow(args: &Args, result: &ReplayResult) {
+    let other = |test: &&Test| !test.pass && ["nis", "whiteness"].contains(&test.name.as_str());
+    let mut axes: Vec<&str> = result.tests.iter().filter(other).map(|test| test.axis.as_str()).collect();
+    axes.dedup();
+    if !axes.is_empty() && args.follow.is_none() && args.form == FormFlag::Joseph && !args.smooth {
+        eprintln!(
+            "  note: the wideband noise is not what the design says ({}): --follow DURATION finds it anew as the log goes on",
+            axes.join(", ")
+        );
     }
 }
 

@@ -38,7 +38,7 @@ pub struct Args {
     #[arg(long, default_value_t = 0)]
     run: u64,
     /// Sample rate in Hz [default: sample_rate of the parameters]
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     rate: Option<f64>,
     /// rest, constant:1deg/s, sine:10deg/s,0.5Hz or file:RATE.csv (one row per sample, one column for all axes or one for each)
     #[arg(long, value_name = "MOTION", default_value = "rest")]

@@ -44,7 +44,7 @@ pub struct Args {
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Slowest time constant that the states for flicker cover
-    #[arg(long, default_value_t = TuneOptions::default().flicker_horizon_s, value_name = "SECONDS")]
+    #[arg(long, default_value_t = TuneOptions::default().flicker_horizon_s, value_name = "SECONDS", allow_negative_numbers = true)]
     flicker_horizon: f64,
     /// Also say what the design does when the sensor has these parameters instead
     #[arg(long, value_name = "PARAMS")]

@@ -235,6 +235,10 @@ fn a_line_that_moves_is_followed() {
     bench.ok("tune params.json -o filter.json");
     let run = |more: &str| {
         let outcome = bench.run(&format!("replay filter.json log.csv --rate 100 --start 200 {more}"));
+        // said only where it would help
+        let said =
+            outcome.stderr.contains("note: the wideband noise is not what the design says (gyro_x): --follow DURATION");
+        assert_eq!(said, more == "--json", "{more}: {}", outcome.stderr);
         (outcome.status, outcome.stdout)
     };
     let axis = |text: &str| serde_json::from_str::<serde_json::Value>(text).unwrap()["axes"][0].clone();

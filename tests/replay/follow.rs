@@ -236,8 +236,7 @@ fn a_line_that_moves_is_followed() {
     let run = |more: &str| {
         let outcome = bench.run(&format!("replay filter.json log.csv --rate 100 --start 200 {more}"));
         // said only where it would help
-        let said =
-            outcome.stderr.contains("note: the wideband noise is not what the design says (gyro_x): --follow DURATION");
+        let said = outcome.stderr.contains("the wideband noise is not what the design says");
         assert_eq!(said, more == "--json", "{more}: {}", outcome.stderr);
         (outcome.status, outcome.stdout)
     };

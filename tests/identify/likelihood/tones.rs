@@ -1,5 +1,6 @@
 //! Steady tones, drift that a log does not tell, slopes that are none.
 
+use kfdesign::identify::recent;
 use kfdesign::params::TermEntry;
 
 use super::*;
@@ -66,6 +67,8 @@ fn a_sinusoid_alone_is_told() {
         words.split("at ").nth(1)?.split(' ').next()?.parse::<f64>().ok()
     };
     assert!(told(&forced).is_some_and(|frequency| (frequency - 1.0).abs() < 1e-3), "{:?}", forced.warnings);
+    let found = identify(&rate, dt, &ModelChoice::Auto);
+    assert_eq!(recent(&rate, dt, &found.fitted.unwrap()), None, "that it goes on is no change of the noise");
     // nine tenths of the power in a line are the noise of some sensors
     let mut noisy = log(&[white(0.01)], 30_000, dt, 78, 0);
     tone(0.4, 1.0, dt, &mut noisy);

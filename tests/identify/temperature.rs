@@ -130,6 +130,9 @@ fn regression_is_generalised_least_squares() {
         }
     }
     assert!((effect.coefficient - 0.02).abs() < 5.0 * effect.sigma);
+    // of both logs, not of the one on whose coefficients its shape is found: wider than 1.96 to either side, for 300 samples do not know the noise well
+    let sides = effect.interval.map(|end| (end - effect.coefficient).abs() / effect.sigma);
+    assert!(sides.iter().all(|side| (1.96..3.2).contains(side)), "{sides:?}");
     assert_eq!(effect.parameters[3].parameter, "turn_on_bias.std_dev");
 }
 

@@ -29,8 +29,8 @@ use crate::noise::Kind;
 use crate::numerics::distribution::{NORMAL_95, chi_square_sf};
 use crate::numerics::reduce::mean;
 use crate::params::Measured;
-use crate::signal::Gap;
 use crate::signal::smoothing::{moving_average, places};
+use crate::signal::{Gap, lines};
 use crate::units::Unit;
 
 /// Length of the average that the temperature is replaced by, s: short beside the minutes in which a package warms up, long beside the period of its samples.
@@ -43,7 +43,7 @@ const STILL: f64 = 0.02;
 /// Places that are tried for an end of the interval, and how near one must come, in standard deviations.
 const PLACES: usize = 40;
 const NEAR: f64 = 0.02;
-/// Share of the information on k that a ramp may leave for the two to be told apart.
+/// Share of the information on k that a ramp must leave for the two to be told apart, and the longest stretch must have for its noise to be looked at.
 const LEAST_LEFT: f64 = 1e-6;
 
 /// The temperature of a log, sample by sample.
@@ -138,7 +138,7 @@ pub fn effect(
     let mut line = data.line(&alone)?;
     let mut near = fitted.fit.clone();
     for _ in 0..TURNS {
-        near = data.less(line).noise(&near).ok_or_else(failed)?;
+        near = best_noise(&data.stretch(line.coefficient, None), &near).ok_or_else(failed)?;
         let moved = data.line(&data.model(&near).ok_or_else(failed)?)?;
         let step = (moved.coefficient - line.coefficient).abs();
         line = moved;
@@ -147,7 +147,7 @@ pub fn effect(
         }
     }
     // the exact maximum is about as far from that on the coefficients as it was without k
-    let before = data.less(Line { coefficient: 0.0, ..line }).noise(&fitted.fit).ok_or_else(failed)?;
+    let before = best_noise(&data.stretch(0.0, None), &fitted.fit).ok_or_else(failed)?;
     let step = fitted.fit.logs.iter().zip(&before.logs).map(|(exact, near)| exact - near);
     let start = Fit { logs: near.logs.iter().zip(step).map(|(near, step)| near + step).collect(), ..near.clone() };
     let with = data.less(line).refined(&near, &start);
@@ -198,12 +198,18 @@ impl Data<'_> {
     /// The samples without what follows the temperature.
     fn less(&self, line: Line) -> Less<'_> {
         let less = |(z, t): (&f64, &f64)| z - line.coefficient * t;
-        let rate: Vec<f64> = self.rate.iter().zip(&self.temperature.rate).map(less).collect();
         let of_log = |(log, beside): (&Vec<Stretch<'_>>, &Vec<Vec<f64>>)| {
             log.iter().zip(beside).map(|(part, t)| part.samples.iter().zip(t).map(less).collect()).collect()
         };
         let owned = self.logs.iter().zip(&self.temperature.logs).map(of_log).collect();
-        Less { data: Ordinates::new(&rate, self.dt, None), logs: self.logs, owned }
+        Less { data: self.stretch(line.coefficient, None), logs: self.logs, owned }
+    }
+
+    /// The longest stretch without `coefficient` times the temperature.
+    fn stretch(&self, coefficient: f64, lines: Option<&[lines::Line]>) -> Ordinates {
+        let less = |(z, t): (&f64, &f64)| z - coefficient * t;
+        let rate: Vec<f64> = self.rate.iter().zip(&self.temperature.rate).map(less).collect();
+        Ordinates::new(&rate, self.dt, lines)
     }
 
     /// Diffuse ln L of every log with f(z, t) in the place of its samples z, t what is beside them; z and with it the bias counts from the mean of the log.
@@ -266,30 +272,46 @@ impl Data<'_> {
         (squares[0] / squares[1]).sqrt()
     }
 
-    /// Where, to both sides of k, 2 ln L has fallen by χ²₁(0.95) from its value there, on the cosine coefficients of the longest stretch, the noise at its best for every k:
-    /// searched from each of `noise`, that of the model with k and that without, for drift that k took the place of may be there all the same.
+    /// Where, to both sides of k, 2 ln L has fallen by χ²₁(0.95) from its value there, the noise at its best for every k: searched from each of `noise`, that of the model with k and
+    /// that without, for drift that k took the place of may be there all the same.
+    ///
+    /// On the cosine coefficients of the longest stretch, which may know less of k than all logs do: counted from its own k in its own standard deviations, as the noise of the model with k gives
+    /// them, and taken from k in those of all logs.
     fn interval(&self, line: Line, noise: [&Fit; 2]) -> Option<[f64; 2]> {
+        let lines = self.stretch(line.coefficient, None).lines;
+        let less = |away: f64| self.stretch(line.coefficient + away, Some(&lines));
+        let held = |away: f64| whittle::log_likelihood(&less(away), &noise[0].form, &noise[0].logs);
+        // a parabola of k: its second difference, and how far away its top is
+        let [below, here, above] = [-1.0, 0.0, 1.0].map(|side| held(side * line.sigma));
+        let fall = 2.0 * here - below - above;
+        if fall.is_nan() || fall <= LEAST_LEFT {
+            return Some([-1.0, 1.0].map(|side| line.coefficient + side * NORMAL_95 * line.sigma));
+        }
+        let (own, top) = (line.sigma / fall.sqrt(), 0.5 * (above - below) / fall * line.sigma);
         let value = |z: f64| {
-            let less = self.less(Line { coefficient: line.coefficient + z * line.sigma, ..line });
-            let found = noise.par_iter().filter_map(|from| less.noise(from));
+            let data = less(top + z * own);
+            let found = noise.par_iter().filter_map(|from| best_noise(&data, from));
             found.map(|fit| fit.log_likelihood).max_by(f64::total_cmp)
         };
-        let top = value(0.0)?;
+        let best = value(0.0)?;
         let limit = |side: f64| {
-            let (mut at, mut near, mut far) = (2.0, 0.0, f64::INFINITY);
-            for _ in 0..PLACES {
-                let root = (2.0 * (top - value(side * at)?)).max(0.0).sqrt();
-                if (root - NORMAL_95).abs() < NEAR || far - near < NEAR {
+            // with the roots of the fall there, which are nearly straight in k
+            let (mut at, mut near, mut far) = (2.0, (0.0, 0.0), None);
+            for place in 0..PLACES {
+                let root = (2.0 * (best - value(side * at)?)).max(0.0).sqrt();
+                if (root - NORMAL_95).abs() < NEAR || far.is_some_and(|(far, _)| far - near.0 < NEAR) {
                     return Some(line.coefficient + side * at * line.sigma);
                 }
                 if root < NORMAL_95 {
-                    near = at
+                    near = (at, root);
                 } else {
-                    far = at
+                    far = Some((at, root));
                 }
-                // the root of the fall is nearly straight; where it levels off, by growing steps
-                let straight = at * (NORMAL_95 / root.max(0.3)).max(if far.is_finite() { 0.0 } else { 1.2 });
-                at = if straight > near && straight < far { straight } else { 0.5 * (near + far) };
+                at = match far {
+                    None => at * (NORMAL_95 / root.max(0.3)).max(1.2),
+                    Some((far, _)) if place % 2 == 1 => 0.5 * (near.0 + far),
+                    Some((far, above)) => near.0 + (far - near.0) * (NORMAL_95 - near.1) / (above - near.1),
+                };
             }
             None
         };
@@ -328,17 +350,6 @@ struct Less<'a> {
 }
 
 impl Less<'_> {
-    /// The maximum on the cosine coefficients, from another; and from the same with a tenth of the drift, which may be all gone.
-    fn noise(&self, from: &Fit) -> Option<Fit> {
-        let lower = from.form.roles().into_iter().zip(&from.logs).map(|((piece, role), log)| {
-            let drift = role == Role::Coefficient && from.form.pieces()[piece].kind().is_drift();
-            if drift { log - std::f64::consts::LN_10 } else { *log }
-        });
-        let starts = [from.logs.clone(), lower.collect()];
-        let fits = starts.par_iter().filter_map(|start| whittle::climb_all(&self.data, &from.form, start));
-        fits.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
-    }
-
     /// The maximum of the exact likelihood, from `start`; `near`: that on the cosine coefficients.
     fn refined(&self, near: &Fit, start: &Fit) -> Fitted {
         let logs: Vec<Vec<Stretch<'_>>> = self
@@ -351,6 +362,17 @@ impl Less<'_> {
             .collect();
         refine(&self.data, near, &precisions(&self.data, near), start, &logs).0
     }
+}
+
+/// The maximum on the cosine coefficients, from another; and from the same with a tenth of the drift, which may be all gone.
+fn best_noise(data: &Ordinates, from: &Fit) -> Option<Fit> {
+    let lower = from.form.roles().into_iter().zip(&from.logs).map(|((piece, role), log)| {
+        let drift = role == Role::Coefficient && from.form.pieces()[piece].kind().is_drift();
+        if drift { log - std::f64::consts::LN_10 } else { *log }
+    });
+    let starts = [from.logs.clone(), lower.collect()];
+    let fits = starts.par_iter().filter_map(|start| whittle::climb_all(data, &from.form, start));
+    fits.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
 }
 
 /// Mean of the samples that can be used.

@@ -136,6 +136,21 @@ fn regression_is_generalised_least_squares() {
     assert_eq!(effect.parameters[3].parameter, "turn_on_bias.std_dev");
 }
 
+/// Four starts of the same course: the shape of the interval is found on one of them, which knows half as much of k, its width is that of all. White noise alone is known so well that it is 1.96 standard
+/// deviations (the ends are found to 0.02, 600 samples of noise add 0.005).
+#[test]
+fn interval_is_that_of_all_logs() {
+    let z: Vec<Vec<f64>> = (0..4).map(|run| log(&[white(0.2)], 600, 1.0, 97, run)).collect();
+    let logs: Vec<Vec<Stretch<'_>>> = z.iter().map(|own| vec![Stretch { missing: 0, samples: own }]).collect();
+    let t: Vec<f64> = (0..600).map(|i| warming(2.0 * f64::from(i))).collect();
+    let regressor = Regressor { rate: t.clone(), logs: vec![vec![t]; 4], noise: None };
+    let effect = regress(&fit(&logs, &z[0], "white"), &logs, &z[0], &regressor).unwrap();
+    for end in effect.interval {
+        let side = (end - effect.coefficient).abs() / effect.sigma;
+        assert!((side - 1.96).abs() < 0.03, "{side}");
+    }
+}
+
 /// k within its 95 % interval, and p below 5 % where k is zero: counts over `runs` logs of 4000 s.
 fn counted(runs: u64) -> [u64; 2] {
     let one = |run: u64| {

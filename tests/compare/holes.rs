@@ -29,8 +29,8 @@ pub fn three_in_a_hundred(sample: usize) -> bool {
     sample / 3 * 7919 % 1000 < 30 && sample > 3
 }
 
-/// Three of every hundred samples are missing. 30 logs of their own model: 1.3 % are rejected when nothing is missing (docs/validation.md); six or more of 30 even
-/// at three times that are, with a probability of 2e-4.
+/// Three of every hundred samples are missing. 30 logs of their own model, of which 1.5 % are rejected (1000 twice as long, docs/validation.md): six or more of
+/// 30 with a probability of 5e-6, and of 2e-4 were it twice that.
 #[test]
 fn true_models_are_kept_beside_holes() {
     let model = [WHITE, drift(0.05)];

@@ -150,7 +150,7 @@ pub fn effect(
     let before = best_noise(&data.stretch(0.0, None), &fitted.fit).ok_or_else(failed)?;
     let step = fitted.fit.logs.iter().zip(&before.logs).map(|(exact, near)| exact - near);
     let start = Fit { logs: near.logs.iter().zip(step).map(|(near, step)| near + step).collect(), ..near.clone() };
-    let with = data.less(line).refined(&near, &start);
+    let with = data.refined(line.coefficient, &near, &start);
     let model = data.model(&with.fit).ok_or_else(failed)?;
     let line = data.line(&model)?;
     let value = total(&data.each(&model, &temperature.logs, |z, t| z - line.coefficient * t));
@@ -195,21 +195,30 @@ impl Data<'_> {
         exact::model(&fit.form, &fit.logs, self.dt, self.rate.len() as f64 * self.dt)
     }
 
-    /// The samples without what follows the temperature.
-    fn less(&self, line: Line) -> Less<'_> {
-        let less = |(z, t): (&f64, &f64)| z - line.coefficient * t;
-        let of_log = |(log, beside): (&Vec<Stretch<'_>>, &Vec<Vec<f64>>)| {
-            log.iter().zip(beside).map(|(part, t)| part.samples.iter().zip(t).map(less).collect()).collect()
-        };
-        let owned = self.logs.iter().zip(&self.temperature.logs).map(of_log).collect();
-        Less { data: self.stretch(line.coefficient, None), logs: self.logs, owned }
-    }
-
     /// The longest stretch without `coefficient` times the temperature.
     fn stretch(&self, coefficient: f64, lines: Option<&[lines::Line]>) -> Ordinates {
         let less = |(z, t): (&f64, &f64)| z - coefficient * t;
         let rate: Vec<f64> = self.rate.iter().zip(&self.temperature.rate).map(less).collect();
         Ordinates::new(&rate, self.dt, lines)
+    }
+
+    /// The maximum of the exact likelihood of what does not follow the temperature, from `start`; `near`: that on the cosine coefficients.
+    fn refined(&self, coefficient: f64, near: &Fit, start: &Fit) -> Fitted {
+        let less = |(z, t): (&f64, &f64)| z - coefficient * t;
+        let of_log = |(log, beside): (&Vec<Stretch<'_>>, &Vec<Vec<f64>>)| {
+            log.iter().zip(beside).map(|(part, t)| part.samples.iter().zip(t).map(less).collect()).collect()
+        };
+        let owned: Beside = self.logs.iter().zip(&self.temperature.logs).map(of_log).collect();
+        let logs: Vec<Vec<Stretch<'_>>> = self
+            .logs
+            .iter()
+            .zip(&owned)
+            .map(|(log, own)| {
+                log.iter().zip(own).map(|(part, samples)| Stretch { missing: part.missing, samples }).collect()
+            })
+            .collect();
+        let data = self.stretch(coefficient, None);
+        refine(&data, near, &precisions(&data, near), start, &logs).0
     }
 
     /// Diffuse ln L of every log with f(z, t) in the place of its samples z, t what is beside them; z and with it the bias counts from the mean of the log.
@@ -338,29 +347,6 @@ impl Data<'_> {
             without: spread(without, 0.0)?,
             with: spread(with, line.coefficient)?,
         })
-    }
-}
-
-/// Samples without what follows the temperature.
-struct Less<'a> {
-    data: Ordinates,
-    logs: &'a [Vec<Stretch<'a>>],
-    /// In the place of the samples of the logs.
-    owned: Beside,
-}
-
-impl Less<'_> {
-    /// The maximum of the exact likelihood, from `start`; `near`: that on the cosine coefficients.
-    fn refined(&self, near: &Fit, start: &Fit) -> Fitted {
-        let logs: Vec<Vec<Stretch<'_>>> = self
-            .logs
-            .iter()
-            .zip(&self.owned)
-            .map(|(log, own)| {
-                log.iter().zip(own).map(|(part, samples)| Stretch { missing: part.missing, samples }).collect()
-            })
-            .collect();
-        refine(&self.data, near, &precisions(&self.data, near), start, &logs).0
     }
 }
 

@@ -263,16 +263,92 @@ const RESTING: [(&str, &str, &str, f64); 16] = [
     ("VN-310 accelerometer, 34 s", "vn", "--rate 20 --columns 14,15,16", 34.5),
 ];
 
+const BROAD: [&str; 4] = [
+    "motion/dlaidig_broad/02_undisturbed_slow_rotation_B.hdf5",
+    "motion/dlaidig_broad/05_undisturbed_slow_rotation_with_breaks_B.hdf5",
+    "motion/dlaidig_broad/07_undisturbed_fast_rotation_B.hdf5",
+    "motion/dlaidig_broad/21_undisturbed_fast_combined.mat",
+];
+const GYRO: &str = "--unit|rad/s";
+const ACCEL: &str = "--unit|m/s^2";
+const XSENS_GYRO: &str = "--columns 2,3,4 --time 1:s --unit|1/6258 rad/s";
+const XSENS_ACCEL: &str = "--columns 2,3,4 --time 1:s --unit|1/415 m/s^2";
+const RAW: &str = "motion/tomisuarez2_ImuCalibration/example_data_calibration.csv";
+const RAW_GYRO: &str = "--rate 100 --columns gx,gy,gz --unit|1/131 deg/s";
+const RAW_ACCEL: &str = "--rate 100 --columns ax,ay,az --unit|1/16384 g";
+const XSENS: [&str; 2] = ["motion/Kyle-ak_imu_tk/xsens_gyro.mat", "motion/Kyle-ak_imu_tk/xsens_acc.mat"];
+
+/// Parts of moving logs that are at rest, by the page of the data: label, file, the parts in s.
+const PARTS: [(&str, &str, &[[f64; 2]]); 7] = [
+    ("aktos-t, trial 02", BROAD[0], &[[1.0, 38.0], [155.0, 184.0]]),
+    ("aktos-t, trial 05", BROAD[1], &[[1.0, 33.0], [103.0, 122.0], [181.0, 205.0]]),
+    ("aktos-t, trial 07", BROAD[2], &[[1.0, 24.0], [146.0, 181.0]]),
+    ("aktos-t, trial 21", BROAD[3], &[[1.0, 34.0], [156.0, 185.0]]),
+    ("Xsens MTi gyro", XSENS[0], &[[1.0, 50.0]]),
+    ("Xsens MTi accelerometer", XSENS[1], &[[1.0, 50.0]]),
+    ("MPU-6050 raw", RAW, &[[0.0, 36.0]]),
+];
+
+/// The flags of the sensors of one of [`PARTS`].
+fn sensors(file: &str) -> Vec<(&'static str, &'static str)> {
+    match file {
+        _ if file == XSENS[0] => vec![("", XSENS_GYRO)],
+        _ if file == XSENS[1] => vec![("", XSENS_ACCEL)],
+        RAW => vec![(" gyro", RAW_GYRO), (" accelerometer", RAW_ACCEL)],
+        _ => vec![(" gyro", GYRO), (" accelerometer", ACCEL)],
+    }
+}
+
+/// The flags that the check of a moving log names leave a part that is at rest by the page of the data, which says whole seconds, and half a minute or more of it.
+#[test]
+fn the_calmest_part_of_a_moving_log_is_one_of_its_rests() {
+    let rests: [&[[f64; 2]]; 7] = [
+        &[[0.0, 40.0], [153.0, 186.4]],
+        &[[0.0, 35.0], [68.0, 76.0], [101.0, 125.0], [147.0, 157.0], [179.0, 207.3]],
+        &[[0.0, 26.0], [144.0, 183.9]],
+        &[[0.0, 36.0], [154.0, 187.7]],
+        &[[0.0, 52.0]],
+        &[[0.0, 52.0]],
+        &[[0.0, 36.5]],
+    ];
+    for ((label, file, _), rests) in PARTS.iter().zip(rests) {
+        let Some(path) = measured(file) else { return };
+        let path = path.display().to_string();
+        let bench = Bench::new();
+        for (sensor, flags) in sensors(file) {
+            let log = Log { label: "", path: "", flags, white: [0.0; 3] };
+            let out = run(&bench, "allan", &[&path], &log, &[]);
+            let says = |text: &str| text.lines().filter(|l| l.contains("calmest on every axis")).count();
+            assert_eq!(says(&out.stderr), 1, "{label}{sensor}: {}", out.stderr);
+            let line = out.stderr.lines().find(|l| l.contains("calmest on every axis")).unwrap();
+            let words: Vec<&str> = line.split_whitespace().collect();
+            let after = |flag: &str| words.iter().position(|w| *w == flag).map(|i| words[i + 1]);
+            let (start, end) = (after("--start"), after("--end"));
+            let seconds = |text: Option<&str>, none: f64| text.map_or(none, |t| t.parse::<f64>().unwrap());
+            let (from, to) = (seconds(start, 0.0), seconds(end, rests.last().unwrap()[1]));
+            assert!(
+                to - from > 30.0 && rests.iter().any(|[first, last]| first - 1.0 < from && to < last + 1.0),
+                "{label}{sensor}: {line}"
+            );
+            // with these flags there is nothing left to cut
+            let cut: Vec<&str> =
+                [("--start", start), ("--end", end)].into_iter().filter_map(|(f, v)| Some([f, v?])).flatten().collect();
+            let out = run(&bench, "allan", &[&path], &log, &cut);
+            assert!(!out.stderr.contains("windows of") && says(&out.stderr) == 0, "{label}{sensor}: {}", out.stderr);
+        }
+    }
+}
+
+/// Axes that keep the bounds on the innovations: at 5 % and at 1 % for each, and at 1 % for all; as designed, followed, by their own parameters.
+type Kept = [[usize; 3]; 3];
+
 /// Parameters from one half of each log, innovations of the other: `cargo test --release -- --ignored --nocapture table_of_halves` prints the table of
 /// docs/validation.md. Outliers are left out where the command says that there are some.
 #[test]
 #[ignore = "prints a table for docs/validation.md"]
 fn table_of_halves() {
-    println!(
-        "| log | axis | n | model | first half on second: max \\|r\\| (lag), NIS | followed | its own parameters | said |"
-    );
-    println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
-    let mut kept = [[0; 3]; 3];
+    let mut kept = Kept::default();
+    print_head();
     for (label, file, flags, span_s) in RESTING {
         let relative = match file {
             "adis" => LOGS[0].path.to_string(),
@@ -281,74 +357,97 @@ fn table_of_halves() {
             file => format!("{SUNSIDED}{file}"),
         };
         let Some(path) = measured(&relative) else { return };
-        let path = path.display().to_string();
-        // Log wants constants
-        let log = Log { label: "", path: "", flags, white: [0.0; 3] };
-        let bench = Bench::new();
-        let [half, end] = [0.5 * span_s, span_s].map(|t| t.to_string());
-        let second = ["--start", half.as_str(), "--end", end.as_str()];
-        let json = |outcome: &Outcome| serde_json::from_str::<Value>(&outcome.stdout).unwrap();
-        let chain = |part: &[&str]| {
-            let identify = |more: &[&str]| {
-                let all = [part, &["-o", "params.json", "--json"], more].concat();
-                json(&run(&bench, "identify", &[&path], &log, &all))
-            };
-            let mut found = identify(&[]);
-            let outliers = |axis: &Value| axis["warnings"].to_string().contains("--robust leaves them out");
-            if found["axes"].as_array().unwrap().iter().any(outliers) {
-                found = identify(&["--robust"]);
+        print_halves(label, &path.display().to_string(), flags, [0.0, span_s], &mut kept);
+    }
+    println!("kept by the bounds at 5 % and 1 % for each axis and 1 % for all: as designed, followed, own {kept:?}");
+}
+
+/// The same of the resting parts of moving logs.
+#[test]
+#[ignore = "prints a table for docs/validation.md"]
+fn table_of_halves_of_resting_parts() {
+    let mut kept = Kept::default();
+    print_head();
+    for (label, file, parts) in PARTS {
+        let Some(path) = measured(file) else { return };
+        for part in parts {
+            for (sensor, flags) in sensors(file) {
+                let label = format!("{label}{sensor}, {} to {} s", part[0], part[1]);
+                print_halves(&label, &path.display().to_string(), flags, *part, &mut kept);
             }
-            let tune = bench.run("tune params.json -o filter.json");
-            assert!(tune.status < 2, "{label}: {}", tune.stderr);
-            let replay = |more: &[&str]| {
-                json(&run(&bench, "replay", &["filter.json", &path], &log, &[&second[..], &["--json"], more].concat()))
-            };
-            // the memory is the log that was identified, at most 1000 s
-            let memory = format!("{}s", f64::min(0.5 * span_s, 1000.0));
-            (found, replay(&[]), replay(&["--follow", &memory]))
-        };
-        let (found, replayed, followed) = chain(&["--end", &half]);
-        let (_, own, _) = chain(&second);
-        for i in 0..3 {
-            let result = |document: &Value| {
-                let axis = &document["axes"][i];
-                let [r, nis] =
-                    [&axis["whiteness"]["max_abs_autocorrelation"], &axis["nis"]["mean"]].map(|v| v.as_f64());
-                format!("{:.4} ({}), {:.3}", r.unwrap_or(f64::NAN), axis["whiteness"]["lag"], nis.unwrap_or(f64::NAN))
-            };
-            // for each axis at 5 % and at 1 %, and for all 48 at 1 %: the factors of docs/validation.md
-            for (kept, document) in kept.iter_mut().zip([&replayed, &followed, &own]) {
-                let axis = &document["axes"][i];
-                let n = axis["accepted"].as_f64().unwrap();
-                let r = axis["whiteness"]["max_abs_autocorrelation"].as_f64().unwrap();
-                let nis = (axis["nis"]["mean"].as_f64().unwrap() - 1.0).abs();
-                for (kept, [of_r, of_nis]) in
-                    kept.iter_mut().zip([[3.3, 3.3 * 2_f64.sqrt()], [3.72, 5.16], [4.60, 7.42]])
-                {
-                    *kept +=
-                        usize::from(r <= f64::max(0.01, of_r / n.sqrt()) && nis <= f64::max(0.02, of_nis / n.sqrt()));
-                }
-            }
-            let axis = &found["axes"][i];
-            let model = axis["candidates"]
-                .as_array()
-                .unwrap()
-                .iter()
-                .find(|c| c["chosen"] == true)
-                .map_or("", |c| c["model"].as_str().unwrap_or(""));
-            let words = axis["warnings"].to_string();
-            let said = ["noise changes", "outliers", "level moves", "not at rest"]
-                .map(|w| if words.contains(w) { w } else { "" });
-            println!(
-                "| {label} | {} | {} | {model} | {} | {} | {} | {} |",
-                ["x", "y", "z"][i],
-                replayed["axes"][i]["samples"],
-                result(&replayed),
-                result(&followed),
-                result(&own),
-                said.iter().filter(|w| !w.is_empty()).copied().collect::<Vec<_>>().join(", ")
-            );
         }
     }
     println!("kept by the bounds at 5 % and 1 % for each axis and 1 % for all: as designed, followed, own {kept:?}");
+}
+
+fn print_head() {
+    println!(
+        "| log | axis | n | model | first half on second: max \\|r\\| (lag), NIS | followed | its own parameters | said |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
+}
+
+fn print_halves(label: &str, path: &str, flags: &'static str, [from, to]: [f64; 2], kept: &mut Kept) {
+    let log = Log { label: "", path: "", flags, white: [0.0; 3] };
+    let bench = Bench::new();
+    let [start, half, end] = [from, 0.5 * (from + to), to].map(|t| t.to_string());
+    let second = ["--start", half.as_str(), "--end", end.as_str()];
+    let json = |outcome: &Outcome| serde_json::from_str::<Value>(&outcome.stdout).unwrap();
+    let chain = |part: &[&str]| {
+        let identify = |more: &[&str]| {
+            let all = [part, &["-o", "params.json", "--json"], more].concat();
+            json(&run(&bench, "identify", &[path], &log, &all))
+        };
+        let mut found = identify(&[]);
+        let outliers = |axis: &Value| axis["warnings"].to_string().contains("--robust leaves them out");
+        if found["axes"].as_array().unwrap().iter().any(outliers) {
+            found = identify(&["--robust"]);
+        }
+        let tune = bench.run("tune params.json -o filter.json");
+        assert!(tune.status < 2, "{label}: {}", tune.stderr);
+        let replay = |more: &[&str]| {
+            json(&run(&bench, "replay", &["filter.json", path], &log, &[&second[..], &["--json"], more].concat()))
+        };
+        // the memory is the log that was identified, at most 1000 s
+        let memory = format!("{}s", f64::min(0.5 * (to - from), 1000.0));
+        (found, replay(&[]), replay(&["--follow", &memory]))
+    };
+    let (found, replayed, followed) = chain(&["--start", &start, "--end", &half]);
+    let (_, own, _) = chain(&second);
+    for i in 0..3 {
+        let result = |document: &Value| {
+            let axis = &document["axes"][i];
+            let [r, nis] = [&axis["whiteness"]["max_abs_autocorrelation"], &axis["nis"]["mean"]].map(|v| v.as_f64());
+            format!("{:.4} ({}), {:.3}", r.unwrap_or(f64::NAN), axis["whiteness"]["lag"], nis.unwrap_or(f64::NAN))
+        };
+        // the factors of docs/validation.md
+        for (kept, document) in kept.iter_mut().zip([&replayed, &followed, &own]) {
+            let axis = &document["axes"][i];
+            let n = axis["accepted"].as_f64().unwrap();
+            let r = axis["whiteness"]["max_abs_autocorrelation"].as_f64().unwrap();
+            let nis = (axis["nis"]["mean"].as_f64().unwrap() - 1.0).abs();
+            for (kept, [of_r, of_nis]) in kept.iter_mut().zip([[3.3, 3.3 * 2_f64.sqrt()], [3.72, 5.16], [4.60, 7.42]]) {
+                *kept += usize::from(r <= f64::max(0.01, of_r / n.sqrt()) && nis <= f64::max(0.02, of_nis / n.sqrt()));
+            }
+        }
+        let axis = &found["axes"][i];
+        let model = axis["candidates"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|c| c["chosen"] == true)
+            .map_or("", |c| c["model"].as_str().unwrap_or(""));
+        let words = axis["warnings"].to_string();
+        let said =
+            ["noise changes", "outliers", "level moves", "not at rest"].map(|w| if words.contains(w) { w } else { "" });
+        println!(
+            "| {label} | {} | {} | {model} | {} | {} | {} | {} |",
+            ["x", "y", "z"][i],
+            replayed["axes"][i]["samples"],
+            result(&replayed),
+            result(&followed),
+            result(&own),
+            said.iter().filter(|w| !w.is_empty()).copied().collect::<Vec<_>>().join(", ")
+        );
+    }
 }

@@ -2,9 +2,10 @@
 
 use clap::{Args, ValueEnum};
 
+use super::flags::with_unit;
 use crate::input::{InputKind, LogOptions, TemperatureColumn};
 use crate::signal::LogCheck;
-use crate::units::{Quantity, Unit};
+use crate::units::{Dimension, Quantity, Unit};
 
 /// How to read LOG.
 #[derive(Clone, Debug, Default, Args)]
@@ -25,12 +26,12 @@ pub struct LogFlags {
     /// Sample rate in Hz if there is no time column; with one, it replaces the stamps
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub rate: Option<f64>,
-    /// Skip the first seconds
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
-    pub start: Option<f64>,
-    /// Stop at this time, seconds from the start of the log
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
-    pub end: Option<f64>,
+    /// Skip what is before this time from the start of the log: seconds, or with a unit (`10min`)
+    #[arg(long, value_name = "TIME", allow_negative_numbers = true)]
+    pub start: Option<String>,
+    /// Stop at this time from the start of the log
+    #[arg(long, value_name = "TIME", allow_negative_numbers = true)]
+    pub end: Option<String>,
     /// What the values are
     #[arg(long, value_enum, default_value_t = InputArg::Rate)]
     pub input: InputArg,
@@ -65,8 +66,8 @@ impl LogFlags {
             time: self.time.clone(),
             unit: self.unit.as_deref().map(Unit::parse).transpose().map_err(|e| anyhow::anyhow!("--unit: {e}"))?,
             rate_hz: self.rate,
-            start_s: self.start,
-            end_s: self.end,
+            start_s: self.start.as_deref().map(|text| seconds("--start", text)).transpose()?,
+            end_s: self.end.as_deref().map(|text| seconds("--end", text)).transpose()?,
             no_digest: false,
             kind: match self.input {
                 InputArg::Rate => InputKind::Rate,
@@ -80,6 +81,14 @@ impl LogFlags {
             temperature: TemperatureColumn::Ignored,
             extra: Vec::new(),
         })
+    }
+}
+
+/// A time without a unit is in seconds.
+fn seconds(flag: &str, text: &str) -> anyhow::Result<f64> {
+    match text.trim().parse::<f64>() {
+        Ok(seconds) => Ok(seconds),
+        Err(_) => with_unit(flag, text, Dimension::TIME, "10min"),
     }
 }
 

@@ -10,6 +10,7 @@
 //! Nothing is repaired. NaN stays NaN, a gap stays a gap with its number of missing samples, everything else is kept.
 
 mod axis;
+mod calm;
 mod line;
 pub(super) mod robust;
 mod stamps;
@@ -43,7 +44,7 @@ pub enum TimeBase {
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Finding {
     /// Short code: "jitter", "gap", "repeated-stamp", "backward-stamp", "rate", "zero-row", "repeated-row", "nan", "stuck",
-    /// "saturated", "quantised", "outlier", "motion", "temperature", "topic",
+    /// "saturated", "quantised", "outlier", "motion", "calm", "temperature", "topic",
     /// "damaged".
     pub kind: String,
     pub axis: Option<String>,
@@ -81,6 +82,11 @@ impl LogCheck {
     /// The axis, or the log as a whole, was found not to be at rest.
     pub fn moves(&self, axis: &str) -> bool {
         self.findings.iter().any(|f| f.kind == "motion" && f.axis.as_deref().is_none_or(|name| name == axis))
+    }
+
+    /// For a log that is meant to move: says nothing of it.
+    pub fn expect_motion(&mut self) {
+        self.findings.retain(|finding| finding.kind != "motion" && finding.kind != "calm");
     }
 }
 
@@ -237,7 +243,7 @@ impl Checker {
         back.map_or(Ok(()), Err)
     }
 
-    pub fn finish(self) -> Outcome {
+    pub fn finish(mut self) -> Outcome {
         let mut notes = Vec::new();
         let looked = self.stamps.as_ref().map(|stamps| stamps.clone().finish());
         let (base, rate_hz, timing) = match (self.rate_hz, looked) {
@@ -261,11 +267,15 @@ impl Checker {
         }
         findings.extend(self.row_notes().into_iter().map(|note| clock.finding(None, note)));
         let mut axes = Vec::with_capacity(self.axes.len());
-        for axis in self.axes {
+        for axis in &mut self.axes {
             let (smallest, largest) = axis.range;
             axes.push(AxisRange { name: axis.name.clone(), usable: axis.usable, smallest, largest });
             let name = axis.name.clone();
             findings.extend(axis.findings(rate_hz).into_iter().map(|note| clock.finding(Some(&name), note)));
+        }
+        if findings.iter().any(|finding| finding.kind == "motion") {
+            let windows: Vec<_> = self.axes.iter().map(|axis| axis.calmness(rate_hz)).collect();
+            findings.extend(calm::note(&windows, self.rows, &clock).map(|note| clock.finding(None, note)));
         }
         let (jitter_s, gaps) = timing.map_or((0.0, Vec::new()), |t| (t.spread, t.gaps));
         let missing = gaps.iter().map(|g| g.missing).sum();
@@ -343,11 +353,15 @@ struct Clock {
 }
 
 impl Clock {
+    fn seconds(&self, place: Place) -> f64 {
+        let by_stamp = self.stamped && place.time_s.is_finite();
+        if by_stamp { place.time_s } else { self.offset_s + place.index as f64 / self.rate_hz }
+    }
+
     /// The note with its place in words.
     fn finding(&self, axis: Option<&str>, note: Note) -> Finding {
         let first = note.first.unwrap_or(Place { index: 0, time_s: f64::NAN });
-        let by_stamp = self.stamped && first.time_s.is_finite();
-        let first_s = if by_stamp { first.time_s } else { self.offset_s + first.index as f64 / self.rate_hz };
+        let first_s = self.seconds(first);
         let axis_name = axis.map(|name| format!("{name}: ")).unwrap_or_default();
         let place = match note.first {
             Some(first) => format!("; first at sample {} ({} s)", first.index, short(first_s)),

@@ -86,7 +86,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let mut reader = LogReader::open(&args.log, &LogOptions { extra, ..args.reading.options()? })?;
     let name = args.log.display().to_string();
     let mut check = reader.check().clone();
-    check.findings.retain(|finding| finding.kind != "motion");
+    check.expect_motion();
     print_check(&name, &check);
     let shape = LogShape {
         axes: reader.axes().iter().map(|a| a.name.clone()).collect(),

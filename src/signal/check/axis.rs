@@ -16,6 +16,7 @@ use std::collections::BTreeMap;
 
 use pulp::{Arch, NullaryFnOnce};
 
+use super::calm::AxisWindows;
 use super::robust::{Sample, median, median_and_spread, quantile, short};
 use super::stamps::Count;
 use super::windows::{Extent, Windows, surely_quiet};
@@ -277,7 +278,7 @@ impl AxisCheck {
         format!("{} {}", short(self.unit.from_si(x)), self.unit)
     }
 
-    pub(super) fn findings(mut self, rate_hz: f64) -> Vec<Note> {
+    pub(super) fn findings(&mut self, rate_hz: f64) -> Vec<Note> {
         self.end_run();
         if self.window.len() >= SHORTEST_WINDOW {
             self.close_window();
@@ -395,6 +396,26 @@ impl AxisCheck {
         });
     }
 
+    /// The largest spread of the means of windows, and the largest mean, of a sensor at rest.
+    fn at_rest(&self) -> (f64, f64) {
+        match self.quantity {
+            Quantity::AngularRate => (3f64.to_radians(), 25f64.to_radians()),
+            Quantity::SpecificForce => (0.5, f64::INFINITY),
+        }
+    }
+
+    /// What the calmest part of the log is looked for in.
+    pub(super) fn calmness(&self, rate_hz: f64) -> AxisWindows<'_> {
+        let from_rate = if self.kind == InputKind::Rate { 1.0 } else { 1.0 / rate_hz };
+        let (most_spread, most_mean) = self.at_rest();
+        AxisWindows {
+            windows: &self.rest,
+            step: quantisation_step(&mut self.sample.values()),
+            most_mean: most_mean * from_rate,
+            most_spread: most_spread * from_rate,
+        }
+    }
+
     fn motion(&self, rate_hz: f64, out: &mut Vec<Note>) {
         let windows = &self.rest.done;
         if windows.len() < 3 {
@@ -411,10 +432,7 @@ impl AxisCheck {
         let mut means: Vec<f64> = windows.iter().map(|(m, _)| m.mean).collect();
         means.sort_unstable_by(f64::total_cmp);
         let spread = quantile(&means, 0.95) - quantile(&means, 0.05);
-        let (most_spread, most_mean) = match self.quantity {
-            Quantity::AngularRate => (3f64.to_radians(), 25f64.to_radians()),
-            Quantity::SpecificForce => (0.5, f64::INFINITY),
-        };
+        let (most_spread, most_mean) = self.at_rest();
         let mean = means.iter().sum::<f64>() / means.len() as f64;
         let seconds = self.rest.size as f64 / rate_hz;
         let finding = |count: u64, first: Option<Place>, what: String| Note {

@@ -3,6 +3,7 @@
 mod false_alarms;
 mod holes;
 mod inflate;
+mod pieces;
 
 use kfdesign::compare::{Comparison, Log, LogAxis, compare};
 use kfdesign::consistency::{Test, Verdict};

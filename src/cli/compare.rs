@@ -61,10 +61,21 @@ pub struct Args {
 pub(super) struct Pair {
     pub(super) params: Params,
     pub(super) log: Log,
+    /// Of every axis of the log, what curves and spectra leave out, if anything.
+    left_out: Vec<Option<String>>,
     pub(super) check: LogCheck,
     pub(super) sha256: Option<String>,
     /// Unit of the log's rate.
     pub(super) unit: Unit,
+}
+
+impl Pair {
+    /// On stderr, of the axes that are named.
+    pub(super) fn print_left_out(&self, axes: &[&str]) {
+        for (axis, note) in self.log.axes.iter().zip(&self.left_out).filter(|(axis, _)| axes.contains(&&*axis.name)) {
+            note.iter().for_each(|note| eprintln!("  note: {}: {note}", axis.name));
+        }
+    }
 }
 
 /// Reads both, prints the log check, and refuses to overwrite either with one of `outputs`.
@@ -86,16 +97,16 @@ pub(super) fn read(
     let parts = stretches(&recording, options.kind);
     let unit =
         parts.first().map(|p| p.unit.clone()).with_context(|| format!("{}: no axis to work on", log.display()))?;
-    let axes: Vec<LogAxis> = parts
+    let (axes, left_out): (Vec<LogAxis>, Vec<Option<String>>) = parts
         .into_iter()
         .map(|part| {
             let at_rest = !check.moves(&part.name);
             part.into_log_axis(at_rest)
         })
-        .collect();
+        .unzip();
     one_for_all(&mut params, &axes);
     let log = Log { quantity: recording.quantity, sample_rate_hz: recording.sample_rate_hz, axes };
-    Ok(Pair { params, log, check, sha256: recording.sha256, unit })
+    Ok(Pair { params, log, left_out, check, sha256: recording.sha256, unit })
 }
 
 /// Axes that are alike but cannot be told apart in the log (a file has one number for three of them): one stands for every axis of the log.
@@ -138,6 +149,7 @@ fn of_quantity(mut given: Vec<Params>, quantity: Quantity, path: &Path) -> anyho
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     compare::check_alpha(args.alpha)?;
     let pair = read(&args.params, &args.log, &args.reading, &[&args.output, &args.report, &args.plot])?;
+    pair.print_left_out(&pair.log.axes.iter().map(|axis| &*axis.name).collect::<Vec<_>>());
     let mut result =
         compare::compare(&pair.params, &pair.log, args.alpha).with_context(|| args.log.display().to_string())?;
     result.params = Some(args.params.display().to_string());

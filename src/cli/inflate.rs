@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 
 use super::Status;
-use super::compare::{Pair, read};
+use super::compare::read;
 use super::log_flags::LogFlags;
 use super::output::{digits, notes, print_json, print_text, table};
 use crate::compare::inflation::{AxisInflation, Inflation, inflated, inflation, usual_from_hz};
@@ -39,20 +39,23 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if let Some(from) = args.from.filter(|f| !(f.is_finite() && *f > 0.0)) {
         bail!("--from is {from}, expected a frequency above 0 Hz");
     }
-    let Pair { params, log, sha256, unit, .. } = read(&args.params, &args.log, &args.reading, &[&args.output])?;
+    let pair = read(&args.params, &args.log, &args.reading, &[&args.output])?;
     let name = args.log.display().to_string();
-    let from = args.from.unwrap_or_else(|| usual_from_hz(log.sample_rate_hz));
-    let mut found = inflation(&params, &log, from).with_context(|| name.clone())?;
+    let from = args.from.unwrap_or_else(|| usual_from_hz(pair.log.sample_rate_hz));
+    let mut found = inflation(&pair.params, &pair.log, from).with_context(|| name.clone())?;
+    // of a log in pieces the notes of the result tell
+    let whole = found.axes.iter().filter(|axis| axis.segments == 1).map(|axis| &*axis.log_axis);
+    pair.print_left_out(&whole.collect::<Vec<_>>());
     found.params = Some(args.params.display().to_string());
     found.log = Some(name);
-    found.log_sha256 = sha256;
+    found.log_sha256.clone_from(&pair.sha256);
     if let Some(path) = &args.output {
-        atomic::write(path, inflated(&params, &found).to_json().as_bytes())?;
+        atomic::write(path, inflated(&pair.params, &found).to_json().as_bytes())?;
     }
     if args.json {
         print_json(&found)?;
     } else {
-        print_text(&text(&found, &unit))?;
+        print_text(&text(&found, &pair.unit))?;
     }
     Ok(Status::Done)
 }

@@ -66,24 +66,17 @@ impl Stretch {
         count
     }
 
-    /// To hold a noise model against, with short holes filled in at rest: what a motion did in a hole is not known.
-    pub(super) fn into_log_axis(mut self, at_rest: bool) -> LogAxis {
+    /// To hold a noise model against, with short holes filled in at rest: what a motion did in a hole is not known. And what is left out of curves and spectra, in words.
+    pub(super) fn into_log_axis(mut self, at_rest: bool) -> (LogAxis, Option<String>) {
         if at_rest {
             self.bridge();
         }
-        self.print_left_out("stands for the log in curves and spectra");
+        let note = self.left_out_note("stands for the log in curves and spectra");
         let Stretch { name, rate, filled, left_out, whole, .. } = self;
-        LogAxis { name, rate, filled, left_out, whole }
+        (LogAxis { name, rate, filled, left_out, whole }, note)
     }
 
-    /// What of the log is outside the stretch, on stderr; `role`: of the stretch.
-    pub(super) fn print_left_out(&self, role: &str) {
-        if let Some(note) = self.left_out_note(role) {
-            eprintln!("  note: {}: {note}", self.name);
-        }
-    }
-
-    /// The same in words, if anything is.
+    /// What of the log is outside the stretch, if anything is; `role`: of the stretch.
     pub(super) fn left_out_note(&self, role: &str) -> Option<String> {
         let (used, left_out) = (self.rate.len(), self.left_out);
         let note = || match self.filled {

@@ -3,6 +3,9 @@
 //! Above a frequency that motion does not reach, u_j = P_j/S_j with P the power of the log's cosine coefficients (ends tapered, so that motion
 //! does not leak upwards) and S the spectrum of the bench model. The factor on densities is √(mean u). Beside it, √(median u/0.4549), 0.4549
 //! the median of χ²₁, which narrow lines do not move.
+//!
+//! A log in pieces is cut into segments of one length between its gaps, each with a Hann window (in a short one motion leaks further up), whose coefficients
+//! are taken together.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -18,6 +21,13 @@ use crate::units::{Quantity, digits};
 
 /// Share of the log over which each end is brought to zero.
 const TAPER: f64 = 0.05;
+/// The log is in pieces when the longest stretch has less than this share of its samples; a length of segments is good when it keeps as much of what the shortest keep.
+const MOST_OF_IT: f64 = 0.8;
+/// Samples of the shortest segments: a tenth of their band is a dozen coefficients.
+const SHORTEST_SEGMENT: usize = 256;
+/// How much neighbours go together in being above the median, over how much they do in size: normal probabilities in two dimensions, 0.48 for a Hann window and 0.37 for
+/// a narrow taper, which ties little.
+const MEDIAN_TIES: f64 = 0.48;
 /// Fewest coefficients in the band.
 const FEWEST: usize = 100;
 /// Level of the bounds of the bands.
@@ -42,8 +52,10 @@ pub struct AxisInflation {
     /// Of the parameters.
     pub name: String,
     pub log_axis: String,
-    /// Used: the longest stretch without gaps and unusable samples, or a longer one whose short holes are filled in.
+    /// Used: the longest stretch without gaps and unusable samples, or a longer one whose short holes are filled in; or of all segments.
     pub samples: usize,
+    /// Of equal length, between the gaps of a log in pieces; 1 where it is one stretch.
+    pub segments: usize,
     pub filled: usize,
     /// Usable samples beside them.
     pub left_out: usize,
@@ -136,8 +148,14 @@ fn inflation_of(
             axis.name
         )));
     }
-    let (tapered, dof) = tapered(&log.rate);
-    let ratios = Ratios { dof, ..Ratios::new(&tapered, dt, &model, from_hz) };
+    let pieces = segments(log);
+    let (parts, share) = match &pieces[..] {
+        [] => (vec![&log.rate[..]], TAPER),
+        pieces => (pieces.to_vec(), 0.5),
+    };
+    let (tapered, dofs): (Vec<Vec<f64>>, Vec<f64>) = parts.iter().map(|part| tapered(part, share)).unzip();
+    let ratios = Ratios { dof: mean(&dofs), ..Ratios::of_segments(&tapered, dt, &model, from_hz) };
+    let samples = parts.iter().map(|part| part.len()).sum::<usize>();
     let count = ratios.values.len();
     if count < FEWEST {
         return Err(failed(format!(
@@ -148,11 +166,11 @@ fn inflation_of(
     let ratio = mean(&ratios.values);
     let squares: f64 = ratios.values.iter().map(|u| u * u).sum();
     // E u² = 3 L² for u of local level L: a level that varies leaves fewer degrees of freedom
-    let dof = dof * (3.0 * (ratio * count as f64).powi(2) / squares).min(count as f64);
+    let dof = ratios.dof * (3.0 * (ratio * count as f64).powi(2) / squares).min(count as f64);
     let interval = [0.975, 0.025].map(|p| (ratio * dof / chi_square_quantile(p, dof)).sqrt());
     let (robust_factor, robust_interval) = robust(&ratios);
     let (bands, z, bound) = ratios.bands(ALPHA);
-    let lines = lines(&ratios, log.rate.len(), dt, &model);
+    let lines = lines(&ratios, samples, parts.len(), dt, &model);
     let factor = ratio.sqrt();
     let mut notes: Vec<String> = other_rate(params.sample_rate_hz, rate_hz, &model).into_iter().collect();
     if factor > LINES_MATTER * robust_factor {
@@ -164,12 +182,23 @@ fn inflation_of(
     }
     notes.extend(not_flat(&bands, &z, bound));
     notes.extend(not_wideband(&model, dt, &ratios));
+    let usable = log.rate.len() - log.filled + log.left_out;
+    let filled = if pieces.is_empty() { log.filled } else { 0 };
+    let left_out = usable + filled - samples;
+    if let [piece, ..] = &pieces[..] {
+        notes.push(format!(
+            "the log is in pieces: {} stretches of {} samples between its gaps are used, {left_out} samples left out",
+            pieces.len(),
+            piece.len()
+        ));
+    }
     Ok(AxisInflation {
         name: axis.name.clone(),
         log_axis: log.name.clone(),
-        samples: log.rate.len(),
-        filled: log.filled,
-        left_out: log.left_out,
+        samples,
+        segments: parts.len(),
+        filled,
+        left_out,
         factor,
         interval,
         robust_factor,
@@ -182,11 +211,27 @@ fn inflation_of(
     })
 }
 
-/// The log about its mean with both ends brought to zero by half a cosine (Tukey 1967), of the same power, and the degrees of freedom that are
+/// Segments of one length between gaps and unusable samples; none where one stretch is most of the log, or no piece is long enough.
+fn segments(log: &LogAxis) -> Vec<&[f64]> {
+    let seen = log.rate.len() - log.filled;
+    if seen as f64 >= MOST_OF_IT * (seen + log.left_out) as f64 {
+        return vec![];
+    }
+    let finite = log.whole.iter().flat_map(|(_, own)| own.split(|x| !x.is_finite()));
+    let pieces: Vec<&[f64]> = finite.filter(|part| part.len() >= SHORTEST_SEGMENT).collect();
+    let mut lengths: Vec<usize> = pieces.iter().map(|part| part.len()).collect();
+    lengths.sort_unstable();
+    let kept = |length: usize| pieces.iter().map(|part| part.len() / length * length).sum::<usize>();
+    let most = kept(SHORTEST_SEGMENT) as f64;
+    let length = lengths.into_iter().rev().find(|length| kept(*length) as f64 >= MOST_OF_IT * most);
+    length.map_or_else(Vec::new, |length| pieces.into_iter().flat_map(|part| part.chunks_exact(length)).collect())
+}
+
+/// Samples about their mean with both ends brought to zero by half a cosine (Tukey 1967) over a share of them, of the same power, and the degrees of freedom that are
 /// left of each coefficient, (Σw²)²/(n Σw⁴).
-fn tapered(rate: &[f64]) -> (Vec<f64>, f64) {
+fn tapered(rate: &[f64], share: f64) -> (Vec<f64>, f64) {
     let (n, level) = (rate.len(), mean(rate));
-    let edge = ((TAPER * n as f64) as usize).max(1);
+    let edge = ((share * n as f64) as usize).max(1);
     let window = |k: usize| {
         let from_end = k.min(n - 1 - k);
         if from_end >= edge {
@@ -202,25 +247,26 @@ fn tapered(rate: &[f64]) -> (Vec<f64>, f64) {
     (out, squares * squares / (n as f64 * fourth))
 }
 
-/// √(median/0.4549) with the distribution-free 95 % interval of a median, the order statistics n/2 ± 1.96 √n/2.
+/// √(median/0.4549) with the distribution-free 95 % interval of a median, the order statistics n/2 ± 1.96 √n/2, further apart where a taper ties neighbours together.
 fn robust(ratios: &Ratios) -> (f64, [f64; 2]) {
     let mut sorted = ratios.values.clone();
     sorted.sort_by(f64::total_cmp);
     let n = sorted.len() as f64;
-    let half = 0.5 * NORMAL_95 * (n / ratios.dof).sqrt();
+    let half = 0.5 * NORMAL_95 * (n * (1.0 + MEDIAN_TIES * (1.0 / ratios.dof - 1.0))).sqrt();
     let at = |rank: f64| (sorted[(rank.max(0.0) as usize).min(sorted.len() - 1)] / CHI_SQUARE_1_MEDIAN).sqrt();
     (at(0.5 * n), [at(0.5 * n - half), at(0.5 * n + half)])
 }
 
-/// Peaks over the model's spectrum in the band. The taper ties neighbouring coefficients together a little: the chance of taking noise for a line,
-/// 10⁻³ without it, is below 10⁻².
-fn lines(ratios: &Ratios, samples: usize, dt: f64, model: &NoiseModel) -> Vec<VibrationLine> {
+/// Peaks over the model's spectrum in the band.
+fn lines(ratios: &Ratios, samples: usize, segments: usize, dt: f64, model: &NoiseModel) -> Vec<VibrationLine> {
     // below the band stands its own level, where nothing is a line
     let mut whole = vec![CHI_SQUARE_1_MEDIAN * robust(ratios).0.powi(2); ratios.first - 1];
     whole.extend(&ratios.values);
     let of = |line: crate::signal::lines::Line| {
         let number = |hz: f64| ((hz / ratios.step_hz) as usize).clamp(1, whole.len()) - 1;
-        let reach = line.width_hz.max(2.0 * ratios.step_hz);
+        // what the taper spreads: a Hann window over four steps of a segment
+        let spread = if segments > 1 { 4 * segments } else { 2 };
+        let reach = line.width_hz.max(spread as f64 * ratios.step_hz);
         let inside = number(line.frequency_hz - reach)..number(line.frequency_hz + reach) + 1;
         let around = number(line.frequency_hz - 20.0 * reach)..number(line.frequency_hz + 20.0 * reach) + 1;
         let mut sorted = whole[around].to_vec();
@@ -232,7 +278,7 @@ fn lines(ratios: &Ratios, samples: usize, dt: f64, model: &NoiseModel) -> Vec<Vi
         VibrationLine { frequency_hz: line.frequency_hz, width_hz: line.width_hz, std_dev: variance.max(0.0).sqrt() }
     };
     let lowest = ratios.first as f64 * ratios.step_hz;
-    let found = find_lines(&whole, ratios.step_hz).into_iter().filter(|l| l.frequency_hz >= lowest);
+    let found = find_lines(&whole, ratios.step_hz, ratios.dof).into_iter().filter(|l| l.frequency_hz >= lowest);
     found.map(of).filter(|line| line.std_dev > 0.0).collect()
 }
 

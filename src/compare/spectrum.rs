@@ -1,5 +1,6 @@
 //! The log's spectrum over the model's, coefficient by coefficient and in bands.
 
+use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -44,6 +45,22 @@ pub(super) struct Ratios {
 }
 
 impl Ratios {
+    /// Of segments of one length, tapered, together: those of one frequency one after the other, about it, as if the step were so many times finer. Each coefficient is
+    /// what it would be of a segment alone.
+    pub(super) fn of_segments(segments: &[Vec<f64>], dt: f64, model: &NoiseModel, from_hz: f64) -> Ratios {
+        let each: Vec<Ratios> = segments.par_iter().map(|part| Ratios::new(part, dt, model, from_hz)).collect();
+        let Some(Ratios { first, step_hz, values, .. }) = each.first() else {
+            return Ratios { values: Vec::new(), first: 1, step_hz: f64::NAN, dof: 1.0 };
+        };
+        let count = each.len();
+        Ratios {
+            values: (0..values.len()).flat_map(|j| each.iter().map(move |own| own.values[j])).collect(),
+            first: first * count - (count - 1) / 2,
+            step_hz: step_hz / count as f64,
+            dof: 1.0,
+        }
+    }
+
     /// From the lowest coefficient at or above `from_hz`. A ramp in the model is taken off the log.
     pub(super) fn new(rate: &[f64], dt: f64, model: &NoiseModel, from_hz: f64) -> Ratios {
         let step_hz = 1.0 / (2.0 * rate.len() as f64 * dt);

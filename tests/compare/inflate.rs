@@ -12,14 +12,14 @@ use crate::support::Bench;
 const WHITE: Term = Term::White { density: 0.1 };
 const DRIFT: Term = Term::GaussMarkov { std_dev: 0.05, correlation_time: 20.0 };
 /// From half a hertz of the five that a rate of 10 Hz has.
-const FROM: f64 = 0.5;
+pub const FROM: f64 = 0.5;
 
 fn of(model: &[Term], log: &Log) -> AxisInflation {
     inflation(&params(model), log, FROM).unwrap().axes.remove(0)
 }
 
 /// Adds a motion in which everything is slow: turns of some hundred times the noise, not the same at the end as at the start.
-fn moved(mut log: Log) -> Log {
+pub fn moved(mut log: Log) -> Log {
     for axis in &mut log.axes {
         for (k, x) in axis.rate.iter_mut().enumerate() {
             let t = k as f64 / log.sample_rate_hz;

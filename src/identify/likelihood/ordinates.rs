@@ -62,7 +62,7 @@ impl Ordinates {
         let step = 1.0 / (2.0 * n as f64 * dt);
         let lines = match lines {
             Some(lines) => lines.to_vec(),
-            None => find_lines(&coefficients.iter().map(|c| c * c).collect::<Vec<_>>(), step),
+            None => find_lines(&coefficients.iter().map(|c| c * c).collect::<Vec<_>>(), step, 1.0),
         };
         let angles = Roots::new(4 * n);
         let scale = -root * dt * (2.0 / n as f64).sqrt();

@@ -211,7 +211,7 @@ fn inflation_of(
     })
 }
 
-/// Segments of one length between gaps and unusable samples; none where one stretch is most of the log, or no piece is long enough.
+/// Two or more segments of one length between gaps and unusable samples; none where one stretch is most of the log, or no other piece is long enough.
 fn segments(log: &LogAxis) -> Vec<&[f64]> {
     let seen = log.rate.len() - log.filled;
     if seen as f64 >= MOST_OF_IT * (seen + log.left_out) as f64 {
@@ -224,7 +224,8 @@ fn segments(log: &LogAxis) -> Vec<&[f64]> {
     let kept = |length: usize| pieces.iter().map(|part| part.len() / length * length).sum::<usize>();
     let most = kept(SHORTEST_SEGMENT) as f64;
     let length = lengths.into_iter().rev().find(|length| kept(*length) as f64 >= MOST_OF_IT * most);
-    length.map_or_else(Vec::new, |length| pieces.into_iter().flat_map(|part| part.chunks_exact(length)).collect())
+    let cut = |length| pieces.iter().flat_map(|part| part.chunks_exact(length)).collect::<Vec<&[f64]>>();
+    length.map(cut).filter(|cut| cut.len() > 1).unwrap_or_default()
 }
 
 /// Samples about their mean with both ends brought to zero by half a cosine (Tukey 1967) over a share of them, of the same power, and the degrees of freedom that are

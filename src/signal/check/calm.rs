@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use super::windows::Windows;
+use super::windows::{PIECE, Windows};
 use super::{Clock, Note, Place};
 use crate::numerics::reduce::Moments;
 
@@ -37,6 +37,9 @@ pub(super) fn note(axes: &[AxisWindows], rows: u64, clock: &Clock) -> Option<Not
     let places = || axes.iter().flat_map(|axis| &axis.windows.done).map(|(_, place)| *place);
     let first = places().filter(|place| place.index >= part.start).min_by_key(|place| place.index)?;
     let end = places().filter(|place| place.index <= part.end).max_by_key(|place| place.index)?;
+    let until = if part.end < rows { end.index } else { rows };
+    // nothing is left where the part is rows without a value
+    let count = until.checked_sub(first.index).filter(|count| *count >= SHORTEST * PIECE as u64)?;
     // inwards, to the power of ten below a window
     let decimals = -(size as f64 / clock.rate_hz).log10().floor();
     let shown = |seconds: f64, round: fn(f64) -> f64| {
@@ -50,7 +53,6 @@ pub(super) fn note(axes: &[AxisWindows], rows: u64, clock: &Clock) -> Option<Not
     if part.end < rows {
         flags.push(format!("--end {}", shown(clock.seconds(end), f64::floor)));
     }
-    let count = if part.end < rows { end.index } else { rows } - first.index;
     Some(Note {
         kind: "calm",
         count,
@@ -225,6 +227,18 @@ mod tests {
         // the first window after the motion has 74 rows, 5056 to 5129, and is left out: 51.3 s and the gap
         assert_eq!((note.first.unwrap().index, note.count), (5130, ROWS as u64 - 5130), "{}", note.message);
         assert!(note.message.contains("that --start 58.3 leaves"), "{}", note.message);
+    }
+
+    /// A hole of thousands of rows between two motions is no calm part.
+    #[test]
+    fn rows_without_values_are_not_named() {
+        let mut x = rest(8);
+        shake(&mut x, 400..4992);
+        shake(&mut x, 15_016..ROWS);
+        // one calm window, half before the hole and half after
+        (5040..15_000).for_each(|i| x[i] = f64::NAN);
+        assert_eq!(flags(&[x.clone()]), "none");
+        assert_eq!(flags(&[x, vec![f64::NAN; ROWS]]), "none", "an axis without any value");
     }
 
     /// Values that stand still are calm, but no measure of the noise.

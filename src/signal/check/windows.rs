@@ -4,7 +4,7 @@ use super::{Place, Places};
 use crate::numerics::reduce::{Moments, by_eight};
 
 /// Values whose moments are taken at once; every window is a multiple.
-const PIECE: usize = 64;
+pub(super) const PIECE: usize = 64;
 const WINDOWS: usize = 4096;
 
 /// Moments of consecutive windows; neighbours are merged when there are too many. How the values come, one by one or many at once,

@@ -1,6 +1,6 @@
 //! The longest part of a moving log in which it is as calm as it ever is.
 //!
-//! An axis at its calmest: the smallest standard deviation that [`TOGETHER`] consecutive windows keep, none of which stands still. A window is calm if its own is at most [`NEAR`] times that, its
+//! An axis at its calmest: the smallest standard deviation that [`TOGETHER`] consecutive windows keep, none of which stands still. A window is calm if it does not stand still and its own is at most [`NEAR`] times that, its
 //! mean is within as much of that of a calm window before it, and it does not turn fast. The part is calm on every axis, and a window shorter on a side that ends in motion:
 //! motion may have begun there.
 
@@ -69,19 +69,20 @@ fn longest(axes: &[AxisWindows], rows: u64, size: u64) -> Option<Range<u64>> {
         moving.extend(axis.moving(rows)?);
     }
     moving.sort_unstable_by_key(|range| range.start);
-    let mut best = 0..0;
+    let mut parts = Vec::new();
     let mut begin = 0;
     for range in moving.into_iter().chain(std::iter::once(rows..rows)) {
         // a window less where motion is next
         let start = if begin > 0 { begin + size } else { 0 };
         let end = if range.start < rows { range.start.saturating_sub(size) } else { rows };
-        if end > start && end - start > best.end - best.start {
-            best = start..end;
+        if end >= start + SHORTEST * size {
+            parts.push(start..end);
         }
         begin = begin.max(range.end);
     }
-    let calm = best.end - best.start >= SHORTEST * size && best != (0..rows);
-    (calm && axes.iter().all(|axis| axis.stays(&best))).then_some(best)
+    // the first of those of one length
+    parts.sort_by_key(|part| std::cmp::Reverse(part.end - part.start));
+    parts.into_iter().find(|part| axes.iter().all(|axis| axis.stays(part))).filter(|part| *part != (0..rows))
 }
 
 impl AxisWindows<'_> {
@@ -103,7 +104,9 @@ impl AxisWindows<'_> {
         let mut moving = Vec::new();
         for (((moments, place), deviation), end) in done.iter().zip(deviations).zip(ends) {
             let moved = before.is_some_and(|before: f64| (moments.mean - before).abs() > most);
-            let calm = deviation <= most && !moved && (slow(moments) || !any_slow);
+            // where values stand still that have no steps, there is no sensor
+            let lives = deviation > 0.0 || self.step.is_some();
+            let calm = lives && deviation <= most && !moved && (slow(moments) || !any_slow);
             before = calm.then_some(moments.mean);
             if !calm {
                 moving.push(place.index..end);
@@ -112,11 +115,14 @@ impl AxisWindows<'_> {
         Some(moving)
     }
 
-    /// Whether the means of the windows in these rows stay together as those of a sensor at rest.
+    /// Whether these rows have values that change, and the means of their windows stay together as those of a sensor at rest.
     fn stays(&self, rows: &Range<u64>) -> bool {
-        let within = self.windows.done.iter().filter(|(_, place)| rows.contains(&place.index)).map(|(m, _)| m.mean);
-        let (low, high) = within.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), m| (low.min(m), high.max(m)));
-        high - low <= self.most_spread
+        let within = || self.windows.done.iter().filter(|(_, place)| rows.contains(&place.index)).map(|(m, _)| m);
+        let low = within().fold(f64::INFINITY, |low, m| low.min(m.mean));
+        let high = within().fold(f64::NEG_INFINITY, |high, m| high.max(m.mean));
+        let values: u64 = within().map(|m| m.count).sum();
+        let lives = within().any(|m| m.variance() > 0.0);
+        lives && 2 * values >= rows.end - rows.start && high - low <= self.most_spread
     }
 }
 
@@ -241,13 +247,25 @@ mod tests {
         assert_eq!(flags(&[x, vec![f64::NAN; ROWS]]), "none", "an axis without any value");
     }
 
-    /// Values that stand still are calm, but no measure of the noise.
+    /// Values that stand still are neither a rest nor a measure of the noise, however long.
     #[test]
-    fn a_stuck_value_is_not_what_calm_is_measured_by() {
+    fn a_stuck_value_is_not_calm() {
         let mut x = rest(4);
         (0..1000).for_each(|i| x[i] = 0.0);
-        shake(&mut x, 15_000..16_000);
-        assert_eq!(flags(&[x]), "--end 149.1");
+        shake(&mut x, 9000..10_000);
+        (10_000..ROWS).for_each(|i| x[i] = 0.0);
+        // 960 is the first window that is not all of one value, and one less on that side; 8960 the first with motion
+        assert_eq!(flags(&[x]), "--start 10.3 --end 88.9");
+    }
+
+    /// The longest part without motion has values of two axes only; then the next is named.
+    #[test]
+    fn all_axes_have_values_in_what_is_named() {
+        let [mut x, mut y] = [rest(9), rest(10)];
+        shake(&mut x, 5000..6000);
+        (6500..ROWS).for_each(|i| y[i] = f64::NAN);
+        assert_eq!(flags(&[x.clone()]), "--start 60.8");
+        assert_eq!(flags(&[x, y]), "--end 49.2");
     }
 
     /// Of noise of a fifth of a step, windows have none to five values of another step.
@@ -255,6 +273,9 @@ mod tests {
     fn steps_that_are_crossed_now_and_then_are_calm() {
         let mut x: Vec<f64> = rest(6).iter().map(|v| (0.2 * v).round()).collect();
         shake(&mut x, 15_000..16_000);
-        assert_eq!(flags_by(&[x], Some(1.0)), "--end 149.1");
+        assert_eq!(flags_by(&[x.clone()], Some(1.0)), "--end 149.1");
+        // but not where they are never crossed
+        (0..15_000).for_each(|i| x[i] = 0.0);
+        assert_eq!(flags_by(&[x], Some(1.0)), "--start 160.7");
     }
 }

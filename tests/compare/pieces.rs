@@ -4,7 +4,7 @@ use kfdesign::compare::inflation::{AxisInflation, inflation};
 use kfdesign::compare::{Log, LogAxis};
 use kfdesign::noise::Term;
 
-use super::inflate::{FROM, moved};
+use super::inflate::{FROM, check_intervals, moved};
 use super::{WHITE, log, params};
 use crate::support::Bench;
 
@@ -59,13 +59,7 @@ fn the_intervals_cover() {
     let found: Vec<AxisInflation> =
         (0..1000).map(|run| of(&[WHITE], &batches(log(&loud, 4800, run), 300, 600))).collect();
     assert!(found.iter().all(|axis| axis.segments == 8));
-    for pick in [|a: &AxisInflation| (a.factor, a.interval), |a: &AxisInflation| (a.robust_factor, a.robust_interval)] {
-        let covered = found.iter().map(pick).filter(|(_, [low, high])| (*low..=*high).contains(&2.0)).count();
-        assert!((914..=986).contains(&covered), "{covered} of 1000");
-        let scatter = (found.iter().map(|a| (pick(a).0 - 2.0).powi(2)).sum::<f64>() / 1000.0).sqrt();
-        let width = found.iter().map(|a| pick(a).1[1] - pick(a).1[0]).sum::<f64>() / 1000.0 / (2.0 * 1.96);
-        assert!((width / scatter - 1.0).abs() < 0.11, "{width} and {scatter}");
-    }
+    check_intervals(&found, 914..=986, 0.11);
 }
 
 /// Neighbouring coefficients of a segment go together by its window. 3 of 1000 such logs of white noise show a line: five or more of 100 with a probability of 2e-5;

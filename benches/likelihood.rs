@@ -134,7 +134,7 @@ fn identify(z: &[f64], choice: &ModelChoice) -> Identified {
 }
 
 fn white_and_drift() -> ModelChoice {
-    ModelChoice::Terms { kinds: vec![Kind::White, Kind::GaussMarkov], average: None }
+    ModelChoice::Terms { kinds: vec![Kind::White, Kind::GaussMarkov], average: None, order: None }
 }
 
 /// Density, standard deviation, correlation time.

@@ -23,6 +23,7 @@ pub fn params(terms: &[Term]) -> Params {
         Term::MovingAverage { density, samples } => {
             TermEntry::MovingAverage { density: si(density, "rad/s/sqrt(Hz)"), samples }
         }
+        Term::BandLimit { density, filter } => TermEntry::BandLimit { density: si(density, "rad/s/sqrt(Hz)"), filter },
         Term::Oscillation { std_dev, frequency_hz, correlation_time } => TermEntry::Oscillation {
             std_dev: si(std_dev, "rad/s"),
             frequency: si(frequency_hz, "Hz"),

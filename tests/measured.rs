@@ -142,10 +142,10 @@ fn failures(replayed: &Value, axis: &str) -> String {
     words.join(", ")
 }
 
-/// Density at low frequency of white noise and averaged noise together.
+/// Density at low frequency of white noise, averaged and filtered noise together.
 fn wideband(axis: &Value) -> f64 {
     let of = |kind: &str| axis[kind]["density"]["value"].as_f64().unwrap_or(0.0);
-    of("white").hypot(of("moving_average"))
+    of("white").hypot(of("moving_average")).hypot(of("band_limit"))
 }
 
 #[test]

@@ -4,10 +4,11 @@
 mod vectors;
 
 mod average;
+mod band_limit;
 mod line;
 mod thinned;
 
-use kfdesign::noise::Term;
+use kfdesign::noise::{Filter, Term};
 use kfdesign::numerics::random::{StreamId, stream};
 use nalgebra::DMatrix;
 use rand::rngs::ChaCha8Rng;
@@ -21,7 +22,20 @@ const LINE: Term = Term::Oscillation { std_dev: 0.03, frequency_hz: 20.3, correl
 const AVERAGE: Term = Term::MovingAverage { density: 0.0562, samples: 3 };
 const RANDOM_WALK: Term = Term::RateRandomWalk { density: 2.85e-3 };
 const RAMP: Term = Term::RateRamp { slope: 2e-4 };
-const ALL: [Term; 8] = [WHITE, AVERAGE, GAUSS_MARKOV, QUANTIZATION, FLICKER, LINE, RANDOM_WALK, RAMP];
+
+/// `scipy.signal.butter(2, 0.2)`: a low-pass at a tenth of the sample rate.
+const BUTTERWORTH: [[f64; 3]; 2] = [
+    [0.067_455_273_889_071_9, 0.134_910_547_778_143_8, 0.067_455_273_889_071_9],
+    [1.0, -1.142_980_502_539_901_1, 0.412_801_598_096_188_77],
+];
+
+fn limited() -> Term {
+    Term::BandLimit { density: 0.0562, filter: Filter::new(&BUTTERWORTH[0], &BUTTERWORTH[1]).unwrap() }
+}
+
+fn all() -> [Term; 9] {
+    [WHITE, AVERAGE, limited(), GAUSS_MARKOV, QUANTIZATION, FLICKER, LINE, RANDOM_WALK, RAMP]
+}
 
 fn assert_relative(found: f64, expected: f64, tolerance: f64, what: &str) {
     assert!((found - expected).abs() <= tolerance * expected.abs(), "{what}: {found:e}, expected {expected:e}");
@@ -123,7 +137,7 @@ mod allan_curve {
     #[test]
     fn equals_the_integral_of_the_spectrum() {
         let gauss_markov = Term::GaussMarkov { std_dev: 0.03, correlation_time: 0.5 };
-        for term in [WHITE, AVERAGE, gauss_markov, QUANTIZATION, FLICKER, LINE, RANDOM_WALK] {
+        for term in [WHITE, AVERAGE, limited(), gauss_markov, QUANTIZATION, FLICKER, LINE, RANDOM_WALK] {
             for m in [1, 2, 3, 10, 64] {
                 let integral = 4.0
                     * integrate(0.0, 0.5 / DT, 400 * m as usize, |f| {
@@ -140,7 +154,7 @@ mod allan_curve {
     #[test]
     fn spectrum_integrates_to_the_autocovariance() {
         let gauss_markov = Term::GaussMarkov { std_dev: 0.03, correlation_time: 0.05 };
-        for term in [WHITE, AVERAGE, gauss_markov, QUANTIZATION, LINE] {
+        for term in [WHITE, AVERAGE, limited(), gauss_markov, QUANTIZATION, LINE] {
             for lag in [0, 1, 2, 7] {
                 let integral = 2.0
                     * integrate(0.0, 0.5 / DT, 400, |f| {
@@ -225,7 +239,8 @@ mod second_difference {
                 _ => term.autocovariance(l, DT).unwrap(),
             }
         };
-        for term in [WHITE, AVERAGE, GAUSS_MARKOV, fast, very_fast, QUANTIZATION, FLICKER, LINE, RANDOM_WALK] {
+        for term in [WHITE, AVERAGE, limited(), GAUSS_MARKOV, fast, very_fast, QUANTIZATION, FLICKER, LINE, RANDOM_WALK]
+        {
             for (m1, m2) in [(1, 1), (1, 2), (2, 1), (3, 3), (5, 12), (12, 5), (1, 25), (20, 20)] {
                 let scale = (term.second_difference_autocovariance(m1, 0, DT)
                     * term.second_difference_autocovariance(m2, 0, DT))
@@ -246,7 +261,7 @@ mod second_difference {
 
     #[test]
     fn is_twice_the_allan_variance_at_lag_zero() {
-        for term in [WHITE, AVERAGE, GAUSS_MARKOV, QUANTIZATION, FLICKER, LINE, RANDOM_WALK] {
+        for term in [WHITE, AVERAGE, limited(), GAUSS_MARKOV, QUANTIZATION, FLICKER, LINE, RANDOM_WALK] {
             for m in [1, 2, 3, 17, 1000, 123_457, 10_000_000] {
                 let expected = 2.0 * (m as f64 * DT).powi(2) * term.allan_variance(m, DT);
                 let found = term.second_difference_autocovariance(m, 0, DT);
@@ -324,7 +339,7 @@ mod realisation {
     #[test]
     fn has_the_allan_variance_of_the_process() {
         let fast = Term::GaussMarkov { std_dev: 0.03, correlation_time: 0.05 };
-        for term in [fast, QUANTIZATION, AVERAGE, LINE, RANDOM_WALK, RAMP, FLICKER] {
+        for term in [fast, QUANTIZATION, AVERAGE, limited(), LINE, RANDOM_WALK, RAMP, FLICKER] {
             // flicker is a chain of states: 1 % between dt and the horizon
             let tolerance = if term == FLICKER { 1e-2 } else { 1e-11 };
             for m in [1, 2, 3, 10, 30] {
@@ -339,7 +354,7 @@ mod realisation {
     /// h Φ^k P0 hᵀ is the autocovariance, and P0 the fixed point of the covariance recursion.
     #[test]
     fn starts_in_its_stationary_law() {
-        for term in [GAUSS_MARKOV, QUANTIZATION, AVERAGE, LINE, FLICKER] {
+        for term in [GAUSS_MARKOV, QUANTIZATION, AVERAGE, limited(), LINE, FLICKER] {
             let r = term.realisation(DT, 1000.0).unwrap();
             let next: DMatrix<f64> = &r.phi * &r.p0 * r.phi.transpose() + &r.q;
             assert!((&next - &r.p0).amax() <= 1e-15 * r.p0.amax(), "{term:?} is not stationary");
@@ -356,7 +371,7 @@ mod realisation {
 
     #[test]
     fn sizes_agree() {
-        for term in ALL {
+        for term in all() {
             let Some(r) = term.realisation(DT, 7200.0) else { continue };
             let n = r.names.len();
             assert_eq!((r.phi.shape(), r.q.shape(), r.p0.shape(), r.h.len()), ((n, n), (n, n), (n, n), n), "{term:?}");
@@ -390,12 +405,13 @@ mod sample_path {
         (sum / count as f64 / (2.0 * (m as f64 * DT).powi(2)), edf)
     }
 
-    /// False alarm: 1e-6 for each of the 32 points (chi-square with at least 130 equivalent degrees of freedom).
+    /// False alarm: 1e-6 for each of the 36 points (chi-square with at least 130 equivalent degrees of freedom).
     #[test]
     fn has_the_allan_curve() {
         let fast = Term::GaussMarkov { std_dev: 0.03, correlation_time: 0.05 };
-        for (seed, term) in
-            [WHITE, GAUSS_MARKOV, fast, QUANTIZATION, FLICKER, RANDOM_WALK, LINE, AVERAGE].into_iter().enumerate()
+        for (seed, term) in [WHITE, GAUSS_MARKOV, fast, QUANTIZATION, FLICKER, RANDOM_WALK, LINE, AVERAGE, limited()]
+            .into_iter()
+            .enumerate()
         {
             let y = path(term, seed as u64, 200_000);
             for m in [1, 4, 40, 400] {
@@ -480,7 +496,7 @@ mod sample_path {
 
     #[test]
     fn twice_n_is_two_n() {
-        for term in ALL {
+        for term in all() {
             let whole = path(term, 3, 1000);
             let mut generator = term.sample_path(DT, rng(3));
             let mut parts = vec![0.0; 1000];

@@ -1,6 +1,6 @@
 //! params.json: what is accepted, what is refused and how, the round trip, the schema.
 
-use kfdesign::noise::Term;
+use kfdesign::noise::{Filter, Term};
 use kfdesign::params::{AxisParams, Inflated, Measured, NotIdentified, Params, Source, TemperatureEffect, TermEntry};
 use kfdesign::units::{Quantity, Unit};
 use serde_json::{Value, json};
@@ -87,6 +87,10 @@ fn writing_and_reading_gives_the_same_document() {
                         density: measured(90.0, "ug/sqrt(Hz)", Some([80.0, 99.0])),
                         samples: 64,
                     },
+                    TermEntry::BandLimit {
+                        density: measured(80.0, "ug/sqrt(Hz)", Some([70.0, 99.0])),
+                        filter: Filter::new(&[0.1, 0.2, 0.1], &[1.0, -1.143, 0.4128]).unwrap(),
+                    },
                     TermEntry::Oscillation {
                         std_dev: measured(3.0, "mg", None),
                         frequency: measured(20.0, "Hz", Some([19.5, 20.5])),
@@ -137,6 +141,10 @@ fn each_complaint_names_file_key_and_reason() {
     let gauss_markov = |term: Value| with("/axes/0/gauss_markov", json!([term]));
     let average =
         |samples: Value| with("/axes/0/moving_average", json!({"density": "1 deg/s/√Hz", "samples": samples}));
+    let limit = |numerator: Value, denominator: Value| {
+        let term = json!({"density": "1 deg/s/√Hz", "numerator": numerator, "denominator": denominator});
+        with("/axes/0/band_limit", term)
+    };
     let line = |key: &str, value: Value| {
         let mut term = json!({"std_dev": "1 deg/s", "frequency": "20 Hz", "correlation_time": "3 s"});
         term[key] = value;
@@ -207,6 +215,14 @@ fn each_complaint_names_file_key_and_reason() {
         (average(json!(-2)), "axes[0].moving_average.samples: ", "whole number"),
         (average(json!("2")), "axes[0].moving_average.samples: ", "whole number"),
         (average(json!(null)), "axes[0].moving_average.samples: ", "missing"),
+        (limit(json!([1, "2"]), json!([1])), "axes[0].band_limit.numerator[1]: ", "expected a number"),
+        (limit(json!(1), json!([1])), "axes[0].band_limit.numerator: ", "expected a list"),
+        (limit(json!([]), json!([1])), "axes[0].band_limit.numerator: ", "0 coefficients, expected 1 to 9"),
+        (limit(json!([1, -1]), json!([1])), "axes[0].band_limit.numerator: ", "passes frequency zero"),
+        (limit(json!([0, 1]), json!([1])), "axes[0].band_limit.numerator: ", "leave a delay out"),
+        (limit(json!([1]), json!([1, -1.5])), "axes[0].band_limit.denominator: ", "expected a stable filter"),
+        (limit(json!([1]), json!([1, -1])), "axes[0].band_limit.denominator: ", "use gauss_markov"),
+        (limit(json!([1]), json!(null)), "axes[0].band_limit.denominator: ", "missing"),
         (with("/axes/0/moving_average", json!({"density": "-1 deg/s/√Hz", "samples": 2})), "axes[0].moving_average.density: ", "greater than zero"),
         (with("/axes/0/moving_average", json!({"density": "1 deg/s", "samples": 2})), "axes[0].moving_average.density: ", "standard deviation of one sample"),
         (line("std_dev", json!("-1 deg/s")), "axes[0].oscillation[0].std_dev: ", "greater than zero"),

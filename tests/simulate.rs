@@ -91,7 +91,10 @@ mod library {
                 .iter()
                 .zip(&kinds)
                 .filter(|(_, kind)| {
-                    !matches!(kind, Kind::White | Kind::Quantization | Kind::MovingAverage | Kind::Oscillation)
+                    !matches!(
+                        kind,
+                        Kind::White | Kind::Quantization | Kind::MovingAverage | Kind::BandLimit | Kind::Oscillation
+                    )
                 })
                 .map(|(t, _)| t[k])
                 .sum();
@@ -167,6 +170,7 @@ mod library {
             (Kind::RateRamp, 0x6_0000),
             (Kind::Oscillation, 0x7_0000),
             (Kind::MovingAverage, 0x8_0000),
+            (Kind::BandLimit, 0x9_0000),
         ] {
             assert_eq!((term_number(kind, 0), term_number(kind, 3)), (code, code + 3));
         }

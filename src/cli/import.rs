@@ -100,7 +100,7 @@ fn rows(params: &Params) -> Vec<Vec<String>> {
     for axis in &params.axes {
         let spread =
             axis.turn_on_bias.iter().map(|v| ("turn-on bias sigma", v)).chain(axis.bias.iter().map(|v| ("bias", v)));
-        let own: Vec<Vec<String>> = term_rows(&axis.terms, params.quantity)
+        let own: Vec<Vec<String>> = term_rows(&axis.terms, params.quantity, params.sample_rate_hz)
             .into_iter()
             // a file has no intervals
             .map(|row| [&row[..2], &row[4..]].concat())

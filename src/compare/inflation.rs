@@ -144,7 +144,7 @@ fn inflation_of(
     let (dt, model) = (1.0 / rate_hz, axis.noise());
     if model.wideband_density() == 0.0 {
         return Err(failed(format!(
-            "the parameters of '{}' have no white or moving_average density to multiply",
+            "the parameters of '{}' have no white, moving_average or band_limit density to multiply",
             axis.name
         )));
     }
@@ -302,7 +302,12 @@ fn not_flat(bands: &[Band], z: &[f64], bound: f64) -> Option<String> {
 /// A sentence when the model's power in the band is not of the terms that are multiplied.
 fn not_wideband(model: &NoiseModel, dt: f64, ratios: &Ratios) -> Option<String> {
     let wideband = NoiseModel {
-        terms: model.terms.iter().filter(|t| matches!(t.kind(), Kind::White | Kind::MovingAverage)).copied().collect(),
+        terms: model
+            .terms
+            .iter()
+            .filter(|t| matches!(t.kind(), Kind::White | Kind::MovingAverage | Kind::BandLimit))
+            .copied()
+            .collect(),
     };
     const SEEN: usize = 1000;
     let places = (0..SEEN).map(|i| (ratios.first + i * ratios.values.len() / SEEN) as f64 * ratios.step_hz);
@@ -315,7 +320,7 @@ fn not_wideband(model: &NoiseModel, dt: f64, ratios: &Ratios) -> Option<String> 
     })
 }
 
-/// The parameters with every white and moving_average density multiplied by the factor of its axis; all else as it was, and a note in `source`.
+/// The parameters with every white, moving_average and band_limit density multiplied by the factor of its axis; all else as it was, and a note in `source`.
 ///
 /// The interval becomes density times the interval of the factor: the product is what the log itself shows, so that the error of the
 /// bench value cancels.
@@ -323,7 +328,10 @@ pub fn inflated(params: &Params, found: &Inflation) -> Params {
     let mut out = params.clone();
     for (axis, inflation) in out.axes.iter_mut().zip(&found.axes) {
         for term in &mut axis.terms {
-            if let TermEntry::White { density } | TermEntry::MovingAverage { density, .. } = term {
+            if let TermEntry::White { density }
+            | TermEntry::MovingAverage { density, .. }
+            | TermEntry::BandLimit { density, .. } = term
+            {
                 density.interval = Some(inflation.interval.map(|f| f * density.value));
                 density.value *= inflation.factor;
             }

@@ -264,7 +264,8 @@ fn compare_axis(
 
 /// What is filled in follows its neighbours in level alone: what that changes.
 fn of_neighbours(model: &NoiseModel, log: &LogAxis) -> Option<String> {
-    let tied = |kind: Kind| matches!(kind, Kind::MovingAverage | Kind::Oscillation | Kind::Quantization);
+    let tied =
+        |kind: Kind| matches!(kind, Kind::MovingAverage | Kind::BandLimit | Kind::Oscillation | Kind::Quantization);
     (log.filled > 0 && model.terms.iter().any(|term| tied(term.kind()))).then(|| {
         format!(
             "{} % of the samples are filled in and are not tied to their neighbours as averages, lines and quantisation are: differences where the model has little power may come from that; \
@@ -284,6 +285,7 @@ fn other_rate(params_hz: f64, log_hz: f64, model: &NoiseModel) -> Option<String>
         .iter()
         .filter_map(|term| match term {
             Term::MovingAverage { samples, .. } => Some(format!("moving_average over {samples} samples")),
+            Term::BandLimit { .. } => Some("band_limit".into()),
             Term::Quantization { .. } => Some("quantization".into()),
             _ => None,
         })

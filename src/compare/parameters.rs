@@ -79,7 +79,7 @@ fn of_axis(axis: &AxisParams, log: &LogAxis, dt: f64, display: &Unit) -> Result<
     let paths: Vec<(String, Measured)> = file
         .clone()
         .noise_parameters()
-        .filter(|(path, _)| !path.starts_with("white") && !path.starts_with("moving_average"))
+        .filter(|(path, _)| !["white", "moving_average", "band_limit"].iter().any(|kind| path.starts_with(kind)))
         .map(|(path, value)| (path, value.clone()))
         .collect();
     for (path, value) in paths {
@@ -92,7 +92,10 @@ fn of_axis(axis: &AxisParams, log: &LogAxis, dt: f64, display: &Unit) -> Result<
             let fitted = match &own {
                 Some(fitted) => fitted,
                 None => own.insert(
-                    kinds.clone().map(|kinds| identify(&ModelChoice::Terms { kinds, average: None })).transpose()?,
+                    kinds
+                        .clone()
+                        .map(|kinds| identify(&ModelChoice::Terms { kinds, average: None, order: None }))
+                        .transpose()?,
                 ),
             };
             estimate = fitted.as_ref().and_then(|fitted| of_path(&file, fitted, &path)).map(|own| Estimate {
@@ -117,7 +120,9 @@ fn time(term: &TermEntry) -> f64 {
 /// All that counts as white noise, at low frequencies, SI, with the unit of the first.
 fn white(file: &AxisParams, dt: f64) -> Option<(f64, Unit)> {
     let unit = file.terms.iter().find_map(|term| match term {
-        TermEntry::White { density } | TermEntry::MovingAverage { density, .. } => Some(density.unit.clone()),
+        TermEntry::White { density }
+        | TermEntry::MovingAverage { density, .. }
+        | TermEntry::BandLimit { density, .. } => Some(density.unit.clone()),
         _ => None,
     })?;
     let square: f64 = file.noise().terms.iter().filter(|t| counts_as_white(t, dt)).map(|t| t.psd(0.0, dt)).sum();

@@ -196,6 +196,7 @@ impl Words<'_> {
         match role {
             Role::CorrelationTime => format!("{name}.correlation_time"),
             Role::Frequency => format!("{name}.frequency"),
+            Role::Shape => format!("{name}.shape"),
             Role::Coefficient if roles(kind).len() > 1 => format!("{name}.std_dev"),
             Role::Coefficient => name.into(),
         }
@@ -208,6 +209,7 @@ impl Words<'_> {
         match role {
             Role::CorrelationTime => format!("{} s", digits(value)),
             Role::Frequency => format!("{} Hz", digits(value)),
+            Role::Shape => digits(value),
             Role::Coefficient => {
                 let unit = super::coefficient_unit(kind, self.display);
                 format!("{} {unit}", digits(unit.from_si(value)))

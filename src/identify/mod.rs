@@ -60,6 +60,8 @@ pub enum ModelChoice {
     Terms {
         kinds: Vec<Kind>,
         average: Option<u32>,
+        /// Poles, and zeros, of `bl`, if that is said (`bl2`).
+        order: Option<u8>,
     },
 }
 
@@ -197,11 +199,19 @@ pub fn parse_model(text: &str) -> Result<ModelChoice, IdentifyError> {
     let failed = |message: String| IdentifyError { message: format!("--model {text}: {message}") };
     let known = || shape::KINDS.map(shape::short_name).join(", ");
     let mut kinds = Vec::new();
-    let mut average = None;
+    let (mut average, mut order) = (None, None);
     for part in text.split('+').map(str::trim) {
         let samples = (2..=likelihood::LONGEST_AVERAGE).find(|samples| part == format!("ma{samples}"));
         average = average.or(samples);
-        let name = if samples.is_some() { "ma" } else { part };
+        let poles = (1..=likelihood::HIGHEST_ORDER).find(|poles| part == format!("bl{poles}"));
+        order = order.or(poles);
+        let name = if samples.is_some() {
+            "ma"
+        } else if poles.is_some() {
+            "bl"
+        } else {
+            part
+        };
         let kind = shape::KINDS
             .into_iter()
             .find(|k| name == shape::short_name(*k) || name == shape::document_name(*k))
@@ -214,11 +224,15 @@ pub fn parse_model(text: &str) -> Result<ModelChoice, IdentifyError> {
     if kinds.iter().filter(|k| **k == Kind::GaussMarkov).count() > 3 {
         return Err(failed("more than three gm cannot be told apart in an Allan curve".into()));
     }
-    if !kinds.contains(&Kind::White) {
-        return Err(failed("white must be part of the model: every sampled sensor has it".into()));
+    if kinds.contains(&Kind::BandLimit) && (kinds.contains(&Kind::MovingAverage) || kinds.contains(&Kind::Quantization))
+    {
+        return Err(failed("bl has averages and quantization in itself: leave them out".into()));
+    }
+    if !kinds.contains(&Kind::White) && !kinds.contains(&Kind::BandLimit) {
+        return Err(failed("white must be part of the model, or bl: every sampled sensor has it".into()));
     }
     kinds.sort_unstable();
-    Ok(ModelChoice::Terms { kinds, average })
+    Ok(ModelChoice::Terms { kinds, average, order })
 }
 
 /// The samples can be worked with.
@@ -247,7 +261,7 @@ fn usable(name: &str, rate: &[f64]) -> Result<(), IdentifyError> {
 fn coefficient_unit(kind: Kind, display: &Unit) -> Unit {
     display.times_time(match kind {
         Kind::Quantization => 2,
-        Kind::White | Kind::MovingAverage => 1,
+        Kind::White | Kind::MovingAverage | Kind::BandLimit => 1,
         Kind::Oscillation | Kind::BiasInstability | Kind::GaussMarkov => 0,
         Kind::RateRandomWalk => -1,
         Kind::RateRamp => -2,
@@ -267,6 +281,7 @@ fn entry(term: &Term, intervals: &[Option<[f64; 2]>], display: &Unit) -> Result<
         Term::Quantization { coefficient: q } => TermEntry::Quantization { coefficient: coefficient(q) },
         Term::White { density } => TermEntry::White { density: coefficient(density) },
         Term::MovingAverage { density, samples } => TermEntry::MovingAverage { density: coefficient(density), samples },
+        Term::BandLimit { density, filter } => TermEntry::BandLimit { density: coefficient(density), filter },
         Term::Oscillation { std_dev, frequency_hz, correlation_time } => TermEntry::Oscillation {
             std_dev: coefficient(std_dev),
             frequency: further(1, frequency_hz, "Hz")?,

@@ -146,7 +146,7 @@ impl Points {
                     add(plain(term.kind()), density * density)
                 }
                 // averages of the log do not show these apart from white noise: no fit to its Allan curve has them
-                Term::MovingAverage { .. } | Term::Oscillation { .. } => {}
+                Term::MovingAverage { .. } | Term::BandLimit { .. } | Term::Oscillation { .. } => {}
             }
         }
         let weights: Vec<(usize, f64)> = weights.into_iter().filter(|(_, weight)| *weight > 0.0).collect();

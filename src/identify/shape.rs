@@ -16,6 +16,8 @@ pub(super) struct Shape {
 pub(super) enum Role {
     /// Enters the Allan variance as its square.
     Coefficient,
+    /// Of a filter: an area ratio, no unit.
+    Shape,
     /// Hz.
     Frequency,
     CorrelationTime,
@@ -88,6 +90,8 @@ pub(super) fn one_coefficient(kind: Kind, value: f64) -> Term {
         Kind::Quantization => Term::Quantization { coefficient: value },
         Kind::White => Term::White { density: value },
         Kind::MovingAverage => Term::MovingAverage { density: value, samples: 2 },
+        // without a filter: white
+        Kind::BandLimit => Term::White { density: value },
         Kind::Oscillation => Term::Oscillation { std_dev: value, frequency_hz: 1.0, correlation_time: 1.0 },
         Kind::BiasInstability => Term::BiasInstability { coefficient: value },
         Kind::GaussMarkov => Term::GaussMarkov { std_dev: value, correlation_time: 1.0 },
@@ -102,6 +106,7 @@ pub(super) fn short_name(kind: Kind) -> &'static str {
         Kind::Quantization => "quantization",
         Kind::White => "white",
         Kind::MovingAverage => "ma",
+        Kind::BandLimit => "bl",
         Kind::Oscillation => "osc",
         Kind::BiasInstability => "flicker",
         Kind::GaussMarkov => "gm",
@@ -116,6 +121,7 @@ pub(super) fn document_name(kind: Kind) -> &'static str {
         Kind::Quantization => "quantization",
         Kind::White => "white",
         Kind::MovingAverage => "moving_average",
+        Kind::BandLimit => "band_limit",
         Kind::Oscillation => "oscillation",
         Kind::BiasInstability => "bias_instability",
         Kind::GaussMarkov => "gauss_markov",
@@ -125,10 +131,11 @@ pub(super) fn document_name(kind: Kind) -> &'static str {
 }
 
 /// All kinds, in the fixed order.
-pub(super) const KINDS: [Kind; 8] = [
+pub(super) const KINDS: [Kind; 9] = [
     Kind::Quantization,
     Kind::White,
     Kind::MovingAverage,
+    Kind::BandLimit,
     Kind::Oscillation,
     Kind::BiasInstability,
     Kind::GaussMarkov,
@@ -136,7 +143,7 @@ pub(super) const KINDS: [Kind; 8] = [
     Kind::RateRamp,
 ];
 
-/// The kinds that show in an Allan curve: it averages a narrow line away, and a moving average is white but for the shortest times.
+/// The kinds that show in an Allan curve: it averages a narrow line away, and averages and band limits are white but for the shortest times.
 pub(super) fn in_allan_curve(kind: Kind) -> bool {
-    !matches!(kind, Kind::MovingAverage | Kind::Oscillation)
+    !matches!(kind, Kind::MovingAverage | Kind::BandLimit | Kind::Oscillation)
 }

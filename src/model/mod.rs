@@ -79,12 +79,12 @@ impl ModelError {
 
 impl LinearModel {
     /// Times x it is the whole drift of the sensor, which is subtracted from what it measures: the output "drift"; where there is none,
-    /// the first row of H without quantisation, moving averages and oscillations, which are noise although they need states.
+    /// the first row of H without quantisation, moving averages, band limits and oscillations, which are noise although they need states.
     pub fn drift_row(&self) -> DMatrix<f64> {
         if let Some(output) = self.outputs.iter().find(|output| output.name == DRIFT) {
             return DMatrix::from_row_slice(1, output.row.len(), &output.row);
         }
-        let kinds = ["quantization", "moving_average", "oscillation"];
+        let kinds = ["quantization", "moving_average", "band_limit", "oscillation"];
         let noise = |j: usize| kinds.iter().any(|kind| self.states[j].name.starts_with(kind));
         DMatrix::from_fn(1, self.states.len(), |_, j| if noise(j) { 0.0 } else { self.h[(0, j)] })
     }

@@ -1,6 +1,6 @@
 //! The spectrum of a process at many frequencies, again and again: the sines are kept, which are most of the work.
 
-use super::{Term, gauss_markov};
+use super::{Filter, Term, gauss_markov};
 
 /// Frequencies, Hz, of samples `dt` s apart, with sine and cosine of π f dt.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,6 +41,13 @@ impl Grid {
     }
 }
 
+impl Grid {
+    /// Of a band limit made of area ratios: ∂ ln S by the logarithm of each, at every frequency, and ∂ ln b₀² by it; `None` where frequencies add.
+    pub(crate) fn shape_slopes(&self, ratios: &[f64]) -> Option<Vec<(Vec<f64>, f64)>> {
+        self.weights.is_empty().then(|| Filter::slopes(ratios, &self.sin, &self.cos))
+    }
+}
+
 impl Term {
     /// [`Term::psd`] at every frequency of the grid.
     pub fn psd_on(&self, grid: &Grid) -> Vec<f64> {
@@ -55,6 +62,10 @@ impl Term {
                 // sines of the sum and of the difference: no digits are lost on the line
                 let both = |(s, c): (&f64, &f64)| spectrum.at(s * c0 - c * s0) + spectrum.at(s * c0 + c * s0);
                 grid.sin.iter().zip(&grid.cos).map(|at| 0.5 * both(at)).collect()
+            }
+            Term::BandLimit { density, filter } => {
+                let at = |(sin, cos): (&f64, &f64)| density * density * filter.power_gain_at(*sin, *cos);
+                grid.sin.iter().zip(&grid.cos).map(at).collect()
             }
             term => grid.frequency_hz.iter().map(|f| term.psd(*f, grid.dt)).collect(),
         };

@@ -4,6 +4,7 @@
 //! `density` u/√Hz, `std_dev` u, `frequency_hz` Hz, `correlation_time` s, rate-random-walk `density` u/√s, `coefficient` of flicker u,
 //! of quantisation u·s, `slope` u/s.
 
+mod band_limit;
 mod bias_instability;
 mod gauss_markov;
 mod grid;
@@ -16,6 +17,7 @@ mod record_mean;
 mod second_difference;
 mod white;
 
+pub use band_limit::{Filter, FilterError, HIGHEST_ORDER};
 pub use grid::Grid;
 use nalgebra::{DMatrix, RowDVector};
 use rand::rngs::ChaCha8Rng;
@@ -37,6 +39,7 @@ pub enum Kind {
     Quantization,
     White,
     MovingAverage,
+    BandLimit,
     Oscillation,
     BiasInstability,
     GaussMarkov,
@@ -48,7 +51,7 @@ impl Kind {
     /// Drift of the bias, which a filter estimates and takes off; else noise of the measurement, whatever states it needs.
     pub fn is_drift(self) -> bool {
         match self {
-            Kind::Quantization | Kind::White | Kind::MovingAverage | Kind::Oscillation => false,
+            Kind::Quantization | Kind::White | Kind::MovingAverage | Kind::BandLimit | Kind::Oscillation => false,
             Kind::BiasInstability | Kind::GaussMarkov | Kind::RateRandomWalk | Kind::RateRamp => true,
         }
     }
@@ -67,6 +70,11 @@ pub enum Term {
     MovingAverage {
         density: f64,
         samples: u32,
+    },
+    /// White noise of this density behind a filter of gain one at frequency zero.
+    BandLimit {
+        density: f64,
+        filter: Filter,
     },
     Oscillation {
         std_dev: f64,
@@ -132,6 +140,7 @@ impl Term {
             Term::Quantization { .. } => Kind::Quantization,
             Term::White { .. } => Kind::White,
             Term::MovingAverage { .. } => Kind::MovingAverage,
+            Term::BandLimit { .. } => Kind::BandLimit,
             Term::Oscillation { .. } => Kind::Oscillation,
             Term::BiasInstability { .. } => Kind::BiasInstability,
             Term::GaussMarkov { .. } => Kind::GaussMarkov,
@@ -146,6 +155,7 @@ impl Term {
             Term::Quantization { coefficient } => quantization::psd(coefficient, f_hz, dt),
             Term::White { density } => white::psd(density),
             Term::MovingAverage { density, samples } => moving_average::psd(density, samples, f_hz, dt),
+            Term::BandLimit { density, filter } => band_limit::psd(density, &filter, f_hz, dt),
             Term::Oscillation { std_dev, frequency_hz, correlation_time } => {
                 oscillation::psd(std_dev, frequency_hz, correlation_time, f_hz, dt)
             }
@@ -163,6 +173,7 @@ impl Term {
             Term::Quantization { coefficient } => quantization::allan_variance(coefficient, m, dt),
             Term::White { density } => white::allan_variance(density, m, dt),
             Term::MovingAverage { density, samples } => moving_average::allan_variance(density, samples, m, dt),
+            Term::BandLimit { density, filter } => band_limit::allan_variance(density, &filter, m, dt),
             Term::Oscillation { std_dev, frequency_hz, correlation_time } => {
                 oscillation::allan_variance(std_dev, frequency_hz, correlation_time, m, dt)
             }
@@ -181,6 +192,7 @@ impl Term {
             Term::Quantization { coefficient } => Some(quantization::autocovariance(coefficient, lag, dt)),
             Term::White { density } => Some(white::autocovariance(density, lag, dt)),
             Term::MovingAverage { density, samples } => Some(moving_average::autocovariance(density, samples, lag, dt)),
+            Term::BandLimit { density, filter } => Some(band_limit::autocovariance(density, &filter, lag, dt)),
             Term::Oscillation { std_dev, frequency_hz, correlation_time } => {
                 Some(oscillation::autocovariance(std_dev, frequency_hz, correlation_time, lag, dt))
             }
@@ -207,6 +219,9 @@ impl Term {
             Term::MovingAverage { density, samples } => {
                 moving_average::second_difference(density, samples, m1, m2, h, dt)
             }
+            Term::BandLimit { density, filter } => {
+                band_limit::second_differences(density, &filter, m1, m2, &[h], dt)[0]
+            }
             Term::Oscillation { std_dev, frequency_hz, correlation_time } => {
                 oscillation::second_difference([std_dev, frequency_hz, correlation_time], m1, m2, h, dt)
             }
@@ -225,6 +240,7 @@ impl Term {
             Term::GaussMarkov { std_dev, correlation_time } => {
                 gauss_markov::second_differences(std_dev, correlation_time, m1, m2, lags, dt)
             }
+            Term::BandLimit { density, filter } => band_limit::second_differences(density, &filter, m1, m2, lags, dt),
             term => lags.iter().map(|h| term.second_difference_cross_covariance(m1, m2, *h, dt)).collect(),
         }
     }
@@ -236,6 +252,7 @@ impl Term {
             Term::Quantization { coefficient } => Some(quantization::realisation(coefficient, dt)),
             Term::White { .. } => None,
             Term::MovingAverage { density, samples } => Some(moving_average::realisation(density, samples, dt)),
+            Term::BandLimit { density, filter } => Some(band_limit::realisation(density, &filter, dt)),
             Term::Oscillation { std_dev, frequency_hz, correlation_time } => {
                 Some(oscillation::realisation(std_dev, frequency_hz, correlation_time, dt))
             }
@@ -255,6 +272,7 @@ impl Term {
             Term::Quantization { coefficient } => Box::new(quantization::Path::new(coefficient, dt, rng)),
             Term::White { density } => Box::new(white::Path::new(density, dt, rng)),
             Term::MovingAverage { density, samples } => Box::new(moving_average::Path::new(density, samples, dt, rng)),
+            Term::BandLimit { density, filter } => Box::new(band_limit::Path::new(density, &filter, dt, rng)),
             Term::Oscillation { std_dev, frequency_hz, correlation_time } => {
                 Box::new(oscillation::Path::new(std_dev, frequency_hz, correlation_time, dt, rng))
             }
@@ -284,10 +302,12 @@ impl NoiseModel {
     pub fn allan_variance(&self, m: u64, dt: f64) -> f64 {
         self.terms.iter().map(|t| t.allan_variance(m, dt)).sum()
     }
-    /// Root of the density at low frequencies of all that is white there: white noise and moving averages.
+    /// Root of the density at low frequencies of all that is white there: white noise, moving averages and band limits.
     pub fn wideband_density(&self) -> f64 {
         let square = |term: &Term| match *term {
-            Term::White { density } | Term::MovingAverage { density, .. } => density * density,
+            Term::White { density } | Term::MovingAverage { density, .. } | Term::BandLimit { density, .. } => {
+                density * density
+            }
             _ => 0.0,
         };
         self.terms.iter().map(square).sum::<f64>().sqrt()

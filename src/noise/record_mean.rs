@@ -13,7 +13,9 @@ impl Term {
     pub fn mean_variance(&self, samples: u64, dt: f64) -> f64 {
         let span = samples as f64 * dt;
         match *self {
-            Term::White { density } | Term::MovingAverage { density, .. } => density * density / span,
+            Term::White { density } | Term::MovingAverage { density, .. } | Term::BandLimit { density, .. } => {
+                density * density / span
+            }
             Term::GaussMarkov { std_dev, correlation_time } => {
                 let x = correlation_time / span;
                 2.0 * std_dev * std_dev * x * (1.0 + x * (-1.0 / x).exp_m1())

@@ -8,14 +8,16 @@ use serde::{Serialize, Serializer};
 use super::measured::Range;
 use super::place::{KeyError, Object, Place};
 use super::{AxisParams, Design, Inflated, Measured, NotIdentified, Params, Source, TemperatureEffect, TermEntry};
+use crate::noise::Filter;
 use crate::units::{Dimension, Quantity, Unit};
 
 pub(super) const FORMAT: &str = "kfdesign-params/1";
 
-const TERM_KEYS: [&str; 8] = [
+const TERM_KEYS: [&str; 9] = [
     "quantization",
     "white",
     "moving_average",
+    "band_limit",
     "oscillation",
     "bias_instability",
     "gauss_markov",
@@ -74,6 +76,9 @@ struct AxisDocument {
     /// White noise that the sensor has averaged over neighbouring samples.
     #[serde(skip_serializing_if = "Option::is_none")]
     moving_average: Option<OneOrMany<MovingAverage>>,
+    /// White noise behind a digital filter: an anti-alias filter, a low-pass in the sensor.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    band_limit: Option<OneOrMany<BandLimit>>,
     /// Vibration lines.
     #[serde(skip_serializing_if = "Option::is_none")]
     oscillation: Option<OneOrMany<Oscillation>>,
@@ -130,6 +135,19 @@ struct MovingAverage {
     density: Measured,
     #[schemars(range(min = 2, max = 64))]
     samples: u32,
+}
+
+/// White noise of this density at low frequencies behind a filter b/a, as `scipy.signal` and MATLAB write it, at the sample rate of the document.
+#[derive(Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct BandLimit {
+    density: Measured,
+    /// b₀, b₁ …: coefficients of z⁰, z⁻¹ …; any common factor.
+    #[schemars(length(min = 1, max = 9))]
+    numerator: Vec<f64>,
+    /// a₀, a₁ …: stable.
+    #[schemars(length(min = 1, max = 9))]
+    denominator: Vec<f64>,
 }
 
 #[derive(Serialize, JsonSchema)]
@@ -216,7 +234,7 @@ fn list<T>(items: Vec<T>) -> Option<OneOrMany<T>> {
 impl From<&AxisParams> for AxisDocument {
     fn from(axis: &AxisParams) -> Self {
         let (mut quantization, mut white, mut bias_instability) = (Vec::new(), Vec::new(), Vec::new());
-        let (mut moving_average, mut oscillation) = (Vec::new(), Vec::new());
+        let (mut moving_average, mut band_limit, mut oscillation) = (Vec::new(), Vec::new(), Vec::new());
         let (mut gauss_markov, mut rate_random_walk, mut rate_ramp) = (Vec::new(), Vec::new(), Vec::new());
         for term in axis.terms.iter().cloned() {
             match term {
@@ -225,6 +243,11 @@ impl From<&AxisParams> for AxisDocument {
                 TermEntry::MovingAverage { density, samples } => {
                     moving_average.push(MovingAverage { density, samples });
                 }
+                TermEntry::BandLimit { density, filter } => band_limit.push(BandLimit {
+                    density,
+                    numerator: filter.numerator().to_vec(),
+                    denominator: filter.denominator().to_vec(),
+                }),
                 TermEntry::Oscillation { std_dev, frequency, correlation_time } => {
                     oscillation.push(Oscillation { std_dev, frequency, correlation_time });
                 }
@@ -246,6 +269,7 @@ impl From<&AxisParams> for AxisDocument {
             quantization: one_or_many(quantization),
             white: one_or_many(white),
             moving_average: one_or_many(moving_average),
+            band_limit: one_or_many(band_limit),
             oscillation: list(oscillation),
             bias_instability: one_or_many(bias_instability),
             gauss_markov: list(gauss_markov),
@@ -401,6 +425,17 @@ fn term(key: &str, place: &Place<'_>, base: Dimension) -> Result<TermEntry, KeyE
             TermEntry::MovingAverage {
                 density: positive(&object, "density", base.times_time(1))?,
                 samples: count as u32,
+            }
+        }
+        "band_limit" => {
+            let object = place.object(&["density", "numerator", "denominator"])?;
+            let numbers = |key: &str| -> Result<Vec<f64>, KeyError> {
+                object.required(key)?.list()?.iter().map(Place::number).collect()
+            };
+            let filter = Filter::new(&numbers("numerator")?, &numbers("denominator")?);
+            TermEntry::BandLimit {
+                density: positive(&object, "density", base.times_time(1))?,
+                filter: filter.or_else(|e| Err(object.required(e.name())?.error(e.to_string())))?,
             }
         }
         "oscillation" => {

@@ -14,7 +14,7 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::noise::{NoiseModel, Term};
+use crate::noise::{Filter, NoiseModel, Term};
 use crate::units::{Quantity, Unit, UnitError};
 
 pub use design::{
@@ -32,6 +32,7 @@ pub enum TermEntry {
     Quantization { coefficient: Measured },
     White { density: Measured },
     MovingAverage { density: Measured, samples: u32 },
+    BandLimit { density: Measured, filter: Filter },
     Oscillation { std_dev: Measured, frequency: Measured, correlation_time: Measured },
     BiasInstability { coefficient: Measured },
     GaussMarkov { std_dev: Measured, correlation_time: Measured },
@@ -78,7 +79,7 @@ pub struct AxisParams {
 #[serde(deny_unknown_fields)]
 pub struct Inflated {
     pub axis: String,
-    /// On the densities of white and moving_average.
+    /// On the densities of white, moving_average and band_limit.
     pub factor: f64,
     /// 95 % of the factor.
     pub interval: [f64; 2],
@@ -150,6 +151,7 @@ impl TermEntry {
             TermEntry::Quantization { coefficient } => ("quantization", vec![("coefficient", coefficient)]),
             TermEntry::White { density } => ("white", vec![("density", density)]),
             TermEntry::MovingAverage { density, .. } => ("moving_average", vec![("density", density)]),
+            TermEntry::BandLimit { density, .. } => ("band_limit", vec![("density", density)]),
             TermEntry::Oscillation { std_dev, frequency, correlation_time } => {
                 let values = [("std_dev", std_dev), ("frequency", frequency), ("correlation_time", correlation_time)];
                 ("oscillation", values.into())
@@ -171,6 +173,7 @@ impl TermEntry {
             TermEntry::MovingAverage { density, samples } => {
                 Term::MovingAverage { density: density.si(), samples: *samples }
             }
+            TermEntry::BandLimit { density, filter } => Term::BandLimit { density: density.si(), filter: *filter },
             TermEntry::Oscillation { std_dev, frequency, correlation_time } => Term::Oscillation {
                 std_dev: std_dev.si(),
                 frequency_hz: frequency.si(),

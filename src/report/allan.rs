@@ -69,6 +69,7 @@ fn term_name(term: &Term) -> String {
         Term::Quantization { .. } => "quantization".into(),
         Term::White { .. } => "white noise".into(),
         Term::MovingAverage { samples, .. } => format!("moving average of {samples}"),
+        Term::BandLimit { .. } => "band limit".into(),
         Term::Oscillation { frequency_hz, .. } => format!("oscillation, {} Hz", digits(*frequency_hz)),
         Term::BiasInstability { .. } => "bias instability".into(),
         Term::GaussMarkov { correlation_time, .. } => format!("Gauss-Markov, {} s", digits(*correlation_time)),

@@ -104,6 +104,7 @@ pub fn term_number(kind: Kind, index: u32) -> u32 {
         // later kinds come after the earlier ones, whose numbers stay
         Kind::Oscillation => 7,
         Kind::MovingAverage => 8,
+        Kind::BandLimit => 9,
     };
     (code << 16) + index
 }

@@ -142,7 +142,10 @@ fn errors(
     kept.terms.retain(|term| {
         !matches!(
             term,
-            TermEntry::Quantization { .. } | TermEntry::MovingAverage { .. } | TermEntry::Oscillation { .. }
+            TermEntry::Quantization { .. }
+                | TermEntry::MovingAverage { .. }
+                | TermEntry::BandLimit { .. }
+                | TermEntry::Oscillation { .. }
         )
     });
     if kept.terms.len() < axis.terms.len() {

@@ -38,7 +38,7 @@ fn part(a: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
 
 /// The noise term that drives a state; of an aid with its name before it.
 fn source(state: &str) -> String {
-    let kinds = ["bias_instability", "moving_average", "quantization", "rate_ramp"];
+    let kinds = ["bias_instability", "moving_average", "band_limit", "quantization", "rate_ramp"];
     if state == "bias" || state.ends_with(".bias") {
         return state.replace("bias", "rate_random_walk");
     }

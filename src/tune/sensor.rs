@@ -8,7 +8,7 @@ use crate::model::observability::observability;
 use crate::model::{InitialBias, LinearModel, ModelError, sensor_errors};
 use crate::noise::{Kind, NoiseModel, Term};
 use crate::numerics::linalg::LinalgError;
-use crate::params::AxisParams;
+use crate::params::{AxisParams, Measured};
 use crate::units::{Quantity, digits};
 
 /// Correlation times and frequencies closer than this, relatively, are one process to any filter.
@@ -37,7 +37,7 @@ pub(super) fn build(axis: &AxisParams, quantity: Quantity, dt: f64, horizon_s: f
     bias.std_dev = match &axis.turn_on_bias {
         Some(given) => given.si(),
         None => {
-            let (std_dev, rule) = turn_on_rule(&model, bias.mean);
+            let (std_dev, rule) = turn_on_rule(&model, axis.bias.as_ref());
             let unit = axis.display_unit(quantity);
             let value = digits(unit.from_si(std_dev));
             warnings.push(format!(
@@ -82,11 +82,16 @@ pub(super) fn observability_sentences(model: &LinearModel) -> Result<Vec<String>
 }
 
 /// P0 of a bias nobody described: the largest of what the parameters hint at.
-fn turn_on_rule(model: &LinearModel, mean: f64) -> (f64, &'static str) {
+fn turn_on_rule(model: &LinearModel, bias: Option<&Measured>) -> (f64, &'static str) {
+    let mean = bias.map_or(0.0, Measured::si);
+    // a bias that happens to be near zero, as after calibration, is no smaller than it is known
+    let known = bias.and_then(Measured::interval_si).map_or(0.0, |[low, high]| 0.5 * (high - low));
     // P0 of the bias is still zero, so this is the stationary variance of the drift
     let drift = 3.0 * drift_sigma(model, &model.p0);
     let sample = 10.0 * (&model.h * &model.p0 * model.h.transpose() + &model.r)[(0, 0)].sqrt();
-    if mean.abs() >= drift && mean != 0.0 {
+    if known > drift.max(mean.abs()) && known.is_finite() {
+        (known, "as far as its interval reaches")
+    } else if mean.abs() >= drift && mean != 0.0 {
         (mean.abs(), "the size of the given bias")
     } else if drift > 0.0 {
         (drift, "three times the standard deviation of the whole drift")
@@ -130,6 +135,9 @@ fn together(a: &Term, b: &Term) -> Option<Term> {
         {
             Some(Term::MovingAverage { density: x.hypot(y), samples })
         }
+        (Term::BandLimit { density: x, filter }, Term::BandLimit { density: y, filter: other }) if filter == other => {
+            Some(Term::BandLimit { density: x.hypot(y), filter })
+        }
         (
             Term::Oscillation { std_dev: x, frequency_hz, correlation_time },
             Term::Oscillation { std_dev: y, frequency_hz: other, correlation_time: time },
@@ -150,6 +158,7 @@ fn name(kind: Kind) -> &'static str {
         Kind::Quantization => "quantization",
         Kind::White => "white",
         Kind::MovingAverage => "moving_average",
+        Kind::BandLimit => "band_limit",
         Kind::Oscillation => "oscillation",
         Kind::BiasInstability => "bias_instability",
         Kind::GaussMarkov => "gauss_markov",

@@ -19,7 +19,7 @@ pub(super) fn samples(model: &NoiseModel, n: usize, dt: f64) -> (DMatrix<f64>, D
                     Term::Quantization { coefficient } => {
                         (coefficient / dt).powi(2) * [2.0, -1.0].get(lag).unwrap_or(&0.0)
                     }
-                    Term::MovingAverage { .. } | Term::Oscillation { .. } => {
+                    Term::MovingAverage { .. } | Term::BandLimit { .. } | Term::Oscillation { .. } => {
                         term.autocovariance(lag as u64, dt).unwrap()
                     }
                     Term::RateRamp { .. } => 0.0,

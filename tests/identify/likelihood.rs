@@ -1,5 +1,6 @@
 //! Maximum likelihood: known truth within the Cramér-Rao bound, nothing invented, odd logs.
 
+mod band_limit;
 mod exact;
 mod gaps;
 mod recent;

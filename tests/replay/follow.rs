@@ -38,6 +38,11 @@ fn params(terms: &[Term]) -> String {
         Term::MovingAverage { density, samples } => {
             format!(r#""moving_average": {{"density": "{density} rad/s/sqrt(Hz)", "samples": {samples}}}"#)
         }
+        Term::BandLimit { density, filter } => format!(
+            r#""band_limit": {{"density": "{density} rad/s/sqrt(Hz)", "numerator": {:?}, "denominator": {:?}}}"#,
+            filter.numerator(),
+            filter.denominator()
+        ),
         Term::Oscillation { std_dev, frequency_hz, correlation_time } => format!(
             r#""oscillation": [{{"std_dev": "{std_dev} rad/s", "frequency": "{frequency_hz} Hz", "correlation_time": "{correlation_time} s"}}]"#
         ),

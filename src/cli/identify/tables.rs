@@ -21,7 +21,8 @@ pub(super) fn parameters(axis: &Axis, quantity: Quantity) -> Shown {
     let caption = if turn_on.is_some() { "bias (mean of all starts)" } else { "bias (mean of this log)" };
     let bias = found.params.bias.iter().map(|bias| row(caption, bias, String::new()));
     let bias = bias.chain(turn_on.map(|spread| row("turn-on bias sigma", spread, String::new()))).collect();
-    let (bias, mut rows): (Vec<Vec<String>>, _) = (bias, term_rows(&found.params.terms, quantity));
+    let (bias, mut rows): (Vec<Vec<String>>, _) =
+        (bias, term_rows(&found.params.terms, quantity, 1.0 / found.curve.dt));
     if found.precision.is_empty() {
         let header = &["parameter", "value", "95 % from", "to", "unit", "also"];
         return Shown { caption: "Parameters with 95 % intervals", header, rows: [bias, rows].concat() };
@@ -54,7 +55,7 @@ fn row(name: &str, value: &Measured, also: String) -> Vec<String> {
 }
 
 /// One row for each parameter, in the order of the document.
-pub(in crate::cli) fn term_rows(terms: &[TermEntry], quantity: Quantity) -> Vec<Vec<String>> {
+pub(in crate::cli) fn term_rows(terms: &[TermEntry], quantity: Quantity, sample_rate_hz: f64) -> Vec<Vec<String>> {
     let mut rows = Vec::new();
     let white =
         terms.iter().find_map(|term| if let TermEntry::White { density } = term { Some(density) } else { None });
@@ -67,6 +68,10 @@ pub(in crate::cli) fn term_rows(terms: &[TermEntry], quantity: Quantity) -> Vec<
                 let total = density.si().hypot(white.map_or(0.0, Measured::si));
                 let also = format!("over {samples} samples; with white {} {unit}", digits(unit.from_si(total)));
                 rows.push(row("moving average N", density, also));
+            }
+            TermEntry::BandLimit { density, filter } => {
+                let corner = filter.half_power().map(|share| format!("-3 dB at {} Hz", digits(share * sample_rate_hz)));
+                rows.push(row("band limit N", density, corner.unwrap_or_default()));
             }
             TermEntry::Oscillation { std_dev, frequency, correlation_time } => {
                 rows.push(row("oscillation sigma", std_dev, String::new()));

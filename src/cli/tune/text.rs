@@ -297,7 +297,7 @@ fn share_rows(budget: &[Share], scale: f64) -> Vec<Vec<String>> {
 
 /// States with a column of their own: not those that only together stand for flicker or an average.
 pub(super) fn told(model: &LinearModel) -> impl Iterator<Item = usize> + '_ {
-    let together = ["bias_instability", "moving_average"];
+    let together = ["bias_instability", "moving_average", "band_limit"];
     (0..model.states.len()).filter(move |&i| !together.iter().any(|kind| model.states[i].name.starts_with(kind)))
 }
 

@@ -119,7 +119,7 @@ impl Numbers {
                 }
                 Term::RateRandomWalk { density } => walk_square += density * density,
                 Term::BiasInstability { .. } => processes.extend(chain(term, dt)),
-                Term::White { .. } | Term::MovingAverage { .. } => {}
+                Term::White { .. } | Term::MovingAverage { .. } | Term::BandLimit { .. } => {}
                 Term::Oscillation { .. } => left_out.push("oscillation"),
                 Term::Quantization { .. } => left_out.push("quantization"),
                 Term::RateRamp { .. } => left_out.push("rate_ramp"),
@@ -200,7 +200,9 @@ fn chain(term: &Term, dt: f64) -> Vec<GaussMarkov> {
 /// Only where white noise is one term with an interval.
 fn white_interval(axis: &AxisParams) -> Option<[f64; 2]> {
     let mut wideband = axis.terms.iter().filter_map(|term| match term {
-        TermEntry::White { density } | TermEntry::MovingAverage { density, .. } => Some(density),
+        TermEntry::White { density }
+        | TermEntry::MovingAverage { density, .. }
+        | TermEntry::BandLimit { density, .. } => Some(density),
         _ => None,
     });
     let only = wideband.next()?;

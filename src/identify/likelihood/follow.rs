@@ -11,6 +11,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::super::shape::Role;
 use super::form::Form;
 use super::names::{name_of, unit_of};
 use super::ordinates::Ordinates;
@@ -57,7 +58,10 @@ impl Follower {
             let indices = first..first + own.len();
             first = indices.end;
             let term = piece.term(&own.iter().map(|v| v.exp()).collect::<Vec<f64>>());
-            free.extend(indices.filter(|_| term.is_some_and(|term| counts_as_white(&term, dt))));
+            let wideband = term.is_some_and(|term| counts_as_white(&term, dt));
+            // a window says little of the shape of a filter
+            let moves = piece.roles().iter().map(|role| wideband && *role != Role::Shape);
+            free.extend(indices.zip(moves).filter(|(_, moves)| *moves).map(|(i, _)| i));
         }
         Follower { design: logs.clone(), now: logs, free, form, dt, memory }
     }

@@ -3,7 +3,18 @@
 use std::ops::Range;
 
 use super::super::shape::{Role, roles};
-use crate::noise::{Kind, NoiseModel, Term};
+use crate::noise::{Filter, HIGHEST_ORDER, Kind, NoiseModel, Term};
+
+/// White noise beside a band limit whose shape is searched, variance over that of its innovations. An ARMA(p, p) process holds any white noise in itself, so that
+/// none of its own can be told; a filter needs some measurement noise.
+const FLOOR: f64 = 1e-5;
+
+/// Density, and the area ratios of poles and zeros.
+const BAND_LIMIT: [Role; 2 * HIGHEST_ORDER + 1] = {
+    let mut roles = [Role::Shape; 2 * HIGHEST_ORDER + 1];
+    roles[0] = Role::Coefficient;
+    roles
+};
 
 /// One process of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -11,6 +22,10 @@ pub(super) enum Piece {
     White,
     /// Over so many samples.
     MovingAverage(u32),
+    /// Of so many poles and zeros, searched; with the [`FLOOR`] of white noise that a filter needs.
+    BandLimit(u8),
+    /// Of this very shape.
+    Filtered(Filter),
     Quantization,
     Oscillation,
     Flicker,
@@ -22,13 +37,18 @@ pub(super) enum Piece {
 impl Piece {
     /// Parameters that stand in the spectrum. The slope of a ramp is none of them: its best value follows from the others.
     pub(super) fn roles(self) -> &'static [Role] {
-        if self == Piece::Ramp { &[] } else { roles(self.kind()) }
+        match self {
+            Piece::Ramp => &[],
+            Piece::BandLimit(order) => &BAND_LIMIT[..=2 * usize::from(order)],
+            piece => roles(piece.kind()),
+        }
     }
 
     pub(super) fn kind(self) -> Kind {
         match self {
             Piece::White => Kind::White,
             Piece::MovingAverage(_) => Kind::MovingAverage,
+            Piece::BandLimit(_) | Piece::Filtered(_) => Kind::BandLimit,
             Piece::Quantization => Kind::Quantization,
             Piece::Oscillation => Kind::Oscillation,
             Piece::Flicker => Kind::BiasInstability,
@@ -43,6 +63,10 @@ impl Piece {
         Some(match (self, values) {
             (Piece::White, &[density]) => Term::White { density },
             (Piece::MovingAverage(samples), &[density]) => Term::MovingAverage { density, samples },
+            (Piece::BandLimit(_), [density, ratios @ ..]) => {
+                Term::BandLimit { density: *density, filter: Filter::from_area_ratios(ratios)? }
+            }
+            (Piece::Filtered(filter), &[density]) => Term::BandLimit { density, filter },
             (Piece::Quantization, &[coefficient]) => Term::Quantization { coefficient },
             (Piece::Oscillation, &[std_dev, frequency_hz, correlation_time]) => {
                 Term::Oscillation { std_dev, frequency_hz, correlation_time }
@@ -54,11 +78,27 @@ impl Piece {
         })
     }
 
+    /// White noise that goes with the piece at these values.
+    pub(super) fn floor(self, values: &[f64]) -> Option<Term> {
+        match (self, self.term(values)?) {
+            (Piece::BandLimit(_), Term::BandLimit { density, filter }) => {
+                Some(Term::White { density: density * (FLOOR * filter.innovation()).sqrt() })
+            }
+            _ => None,
+        }
+    }
+
+    /// All processes of the piece at these values.
+    pub(super) fn terms(self, values: &[f64]) -> impl Iterator<Item = Term> + use<> {
+        self.floor(values).into_iter().chain(self.term(values))
+    }
+
     /// The piece that a process is, with its values; the slope of a ramp is none of them.
     pub(super) fn of(term: &Term) -> (Piece, Vec<f64>) {
         match *term {
             Term::White { density } => (Piece::White, vec![density]),
             Term::MovingAverage { density, samples } => (Piece::MovingAverage(samples), vec![density]),
+            Term::BandLimit { density, filter } => (Piece::Filtered(filter), vec![density]),
             Term::Quantization { coefficient } => (Piece::Quantization, vec![coefficient]),
             Term::Oscillation { std_dev, frequency_hz, correlation_time } => {
                 (Piece::Oscillation, vec![std_dev, frequency_hz, correlation_time])
@@ -74,6 +114,7 @@ impl Piece {
     fn short_name(self) -> String {
         match self {
             Piece::MovingAverage(samples) => format!("ma{samples}"),
+            Piece::BandLimit(order) => format!("bl{order}"),
             piece => super::super::shape::short_name(piece.kind()).to_string(),
         }
     }
@@ -94,6 +135,7 @@ impl Form {
     /// Of a model, with its logarithms; the slope of a ramp is none of them.
     pub(super) fn of(model: &NoiseModel) -> (Form, Vec<f64>) {
         let mut pieces: Vec<(Piece, Vec<f64>)> = model.terms.iter().map(Piece::of).collect();
+        searched(&mut pieces);
         pieces.sort_by_key(|(piece, _)| *piece);
         let logs = pieces.iter().flat_map(|(_, values)| values.iter().map(|v| v.ln())).collect();
         (Form::new(pieces.into_iter().map(|(piece, _)| piece).collect()), logs)
@@ -134,7 +176,7 @@ impl Form {
 
     /// The processes at these logarithms; a ramp is none of them.
     pub(super) fn terms<'a>(&'a self, logs: &'a [f64]) -> impl Iterator<Item = Term> + 'a {
-        self.split(logs).filter_map(|(piece, own)| piece.term(&own.iter().map(|v| v.exp()).collect::<Vec<f64>>()))
+        self.split(logs).flat_map(|(piece, own)| piece.terms(&own.iter().map(|v| v.exp()).collect::<Vec<f64>>()))
     }
 
     /// This form and its logarithms with one piece more, and where its logarithms are.
@@ -159,5 +201,21 @@ impl Form {
     /// "white+gm+rrw".
     pub(super) fn label(&self) -> String {
         self.pieces.iter().map(|piece| piece.short_name()).collect::<Vec<_>>().join("+")
+    }
+}
+
+/// A band limit beside its own floor and no other white noise becomes one whose shape is searched, as it was when it was found.
+fn searched(pieces: &mut Vec<(Piece, Vec<f64>)>) {
+    let whites: Vec<usize> = (0..pieces.len()).filter(|i| pieces[*i].0 == Piece::White).collect();
+    let limits: Vec<usize> = (0..pieces.len()).filter(|i| matches!(pieces[*i].0, Piece::Filtered(_))).collect();
+    let ([white], [limit]) = (&whites[..], &limits[..]) else { return };
+    let (Piece::Filtered(filter), density) = (pieces[*limit].0, pieces[*limit].1[0]) else { return };
+    let Some(ratios) = filter.area_ratios() else { return };
+    let piece = Piece::BandLimit((ratios.len() / 2) as u8);
+    let values: Vec<f64> = [density].into_iter().chain(ratios).collect();
+    let Some(Term::White { density: floor }) = piece.floor(&values) else { return };
+    if (pieces[*white].1[0] / floor - 1.0).abs() < 1e-3 {
+        pieces[*limit] = (piece, values);
+        pieces.remove(*white);
     }
 }

@@ -5,20 +5,29 @@
 //! correlation time or a frequency (Davies 1977), which is calibrated by simulation (docs/validation.md).
 
 use std::collections::BTreeMap;
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
+use nalgebra::Complex;
 use rayon::prelude::*;
 
 use super::form::{Form, Piece};
 use super::ordinates::Ordinates;
-use super::whittle::{self, Fit};
-use crate::noise::{Kind, Term};
+use super::whittle::{self, Fit, WIDE_LINE};
+use crate::noise::{Filter, Kind, Term};
 
 /// Processes of one kind at most.
 const MOST_GAUSS_MARKOV: usize = 3;
 const MOST_OSCILLATIONS: usize = 8;
 /// Longest moving average that is tried.
-pub(in crate::identify) const LONGEST_AVERAGE: u32 = 4;
+pub(in crate::identify) const LONGEST_AVERAGE: u32 = 16;
+/// Most poles, and zeros, of a band limit that are tried.
+pub(in crate::identify) const HIGHEST_ORDER: u8 = 6;
+/// And at first; more by one at a time.
+const FIRST_ORDERS: u8 = 4;
+/// A band limit that remembers longer than so many samples is drift, or a line.
+const LONGEST_MEMORY: f64 = 100.0;
+/// Peak of a band limit over its density at low frequencies, in power; what is higher is a line.
+const LARGEST_GAIN: f64 = 10.0;
 /// Ratio of the correlation times from which a new Gauss-Markov process starts.
 const TIME_RATIO: f64 = 4.0;
 /// Starts that are carried to their maximum.
@@ -39,7 +48,17 @@ pub(super) struct Visited {
 fn cost(piece: Piece, data: &Ordinates) -> f64 {
     match piece {
         Piece::White => 0.0,
-        Piece::MovingAverage(_) => 9.0,
+        // longer ones are many more tries
+        Piece::MovingAverage(samples) => {
+            if samples > 4 {
+                12.0
+            } else {
+                9.0
+            }
+        }
+        Piece::Filtered(_) => 9.0,
+        // two coefficients for every pole, searched over everything that they can be
+        Piece::BandLimit(order) => 12.0 + 12.0 * f64::from(order),
         // at one cost, so that likelihood alone decides between a Gauss-Markov process and a chain of them under one coefficient
         Piece::Flicker | Piece::GaussMarkov => 10.0,
         Piece::Quantization | Piece::RandomWalk => 7.0,
@@ -72,6 +91,10 @@ impl Visited {
     }
 }
 
+/// A form with its logarithms, and the shape of a band limit with its order.
+type Bare = (Form, Vec<f64>);
+type OfOrder = (u8, Vec<f64>);
+
 /// A form with logarithms to climb from, and which of them are new.
 type Start = (Form, Vec<f64>, Range<usize>);
 
@@ -99,10 +122,32 @@ pub(super) fn fit(data: &Ordinates, form: &Form) -> Option<Fit> {
     let mut partial = whittle::climb_all(data, &Form::new(vec![Piece::White]), &[whittle::level(data)])?;
     let mut rest: Vec<Piece> = form.pieces().iter().copied().filter(|piece| *piece != Piece::White).collect();
     // wideband pieces first: what is left is drift
-    rest.sort_by_key(|piece| std::cmp::Reverse(matches!(piece, Piece::MovingAverage(_) | Piece::Quantization)));
+    let wideband = |piece: &Piece| matches!(piece, Piece::MovingAverage(_) | Piece::BandLimit(_) | Piece::Quantization);
+    rest.sort_by_key(|piece| std::cmp::Reverse(wideband(piece)));
+    if let Some(Piece::BandLimit(order)) = rest.iter().find(|piece| piece.kind() == Kind::BandLimit).copied() {
+        // beside some drift, which its shape is not to follow; a small one until then
+        let beside = [vec![], starts(data, &partial, Piece::Flicker), starts(data, &partial, Piece::RandomWalk)];
+        let beside = beside.into_iter().flatten().filter_map(|(form, logs, _)| whittle::climb_all(data, &form, &logs));
+        let bases: Vec<Fit> = std::iter::once(partial.clone()).chain(beside).collect();
+        let starts: Vec<Start> = bases.iter().flat_map(|base| band_limits(data, base, order..=order)).collect();
+        let found: Vec<Fit> =
+            starts.par_iter().filter_map(|(form, logs, _)| whittle::climb_all(data, form, logs)).collect();
+        let best = found.into_iter().filter(limits).max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))?;
+        let at = best.form.pieces().iter().position(|piece| piece.kind() == Kind::BandLimit)?;
+        let others: Vec<usize> = (0..best.form.pieces().len()).rev().filter(|i| *i != at).collect();
+        let (form, logs) = others.iter().fold((best.form.clone(), best.logs.clone()), |(f, l), i| f.without(&l, *i));
+        partial = Fit { form, logs, ..best };
+        rest.retain(|piece| piece.kind() != Kind::BandLimit);
+    }
     for piece in rest {
         let starts = starts(data, &partial, piece);
-        let found = starts.par_iter().filter_map(|(form, logs, _)| whittle::climb_all(data, form, logs));
+        // a shape of many coefficients leads astray when what is new is far from its place
+        let limited = form.has(Kind::BandLimit);
+        let found = starts.par_iter().filter_map(|(form, logs, fresh)| {
+            let fresh: Vec<usize> = if limited { fresh.clone().collect() } else { vec![] };
+            let logs = if limited { whittle::climb(data, form, logs, &fresh)?.logs } else { logs.clone() };
+            whittle::climb_all(data, form, &logs).filter(limits)
+        });
         partial = found.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))?;
     }
     Some(partial)
@@ -117,13 +162,14 @@ fn better(data: &Ordinates, visited: &mut Visited, best: &Fit, moves: Vec<Start>
         let free: Vec<usize> = white.into_iter().filter(|i| !fresh.contains(i)).chain(fresh.clone()).collect();
         whittle::climb(data, form, logs, &free)
     };
-    let mut found: Vec<Fit> = moves.par_iter().filter_map(rough).collect();
+    let mut found: Vec<Fit> = moves.par_iter().filter_map(rough).filter(limits).collect();
     found.sort_by(|a, b| score(a, data).total_cmp(&score(b, data)).then_with(|| a.form.cmp(&b.form)));
     found.dedup_by(|b, a| a.form == b.form && (a.log_likelihood - b.log_likelihood).abs() < 1e-3);
     let near = found.first().map_or(0.0, |fit| score(fit, data)) + NEAR;
     let place = found.iter().take_while(|fit| score(fit, data) < near).count().max(POLISHED);
     found.truncate(place.min(2 * POLISHED));
-    let found: Vec<Fit> = found.par_iter().filter_map(|fit| whittle::climb_all(data, &fit.form, &fit.logs)).collect();
+    let whole = |fit: &Fit| whittle::climb_all(data, &fit.form, &fit.logs);
+    let found: Vec<Fit> = found.par_iter().filter_map(whole).filter(limits).collect();
     let chosen = found.iter().min_by(|a, b| score(a, data).total_cmp(&score(b, data))).cloned();
     for fit in found {
         visited.keep(fit);
@@ -135,10 +181,12 @@ fn better(data: &Ordinates, visited: &mut Visited, best: &Fit, moves: Vec<Start>
 fn additions(data: &Ordinates, base: &Fit) -> Vec<Start> {
     let form = &base.form;
     let mut pieces = Vec::new();
-    if !form.has(Kind::Quantization) {
+    // a band limit has both in itself
+    let limited = form.has(Kind::BandLimit);
+    if !form.has(Kind::Quantization) && !limited {
         pieces.push(Piece::Quantization);
     }
-    if !form.has(Kind::MovingAverage) {
+    if !form.has(Kind::MovingAverage) && !limited {
         pieces.extend((2..=LONGEST_AVERAGE).map(Piece::MovingAverage));
     }
     for (piece, most) in [
@@ -152,7 +200,76 @@ fn additions(data: &Ordinates, base: &Fit) -> Vec<Start> {
             pieces.push(piece);
         }
     }
-    pieces.into_iter().flat_map(|piece| starts(data, base, piece)).collect()
+    let mut moves: Vec<Start> = pieces.into_iter().flat_map(|piece| starts(data, base, piece)).collect();
+    if !limited {
+        moves.extend(band_limits(data, base, 1..=FIRST_ORDERS));
+    }
+    moves
+}
+
+/// Not more than a band limit is: it is forgotten soon, so that it takes no drift, and its density is that of the noise, no part of it that is hidden below
+/// something else; true of all without a band limit.
+fn limits(fit: &Fit) -> bool {
+    fit.form.terms(&fit.logs).all(|term| match term {
+        Term::BandLimit { filter, .. } => filter.memory() <= LONGEST_MEMORY && filter.peak_gain() <= LARGEST_GAIN,
+        _ => true,
+    })
+}
+
+/// A band limit in place of the wideband noise of `base`; also of its wide lines, which may have stood for it.
+fn band_limits(data: &Ordinates, base: &Fit, orders: RangeInclusive<u8>) -> Vec<Start> {
+    let wideband = |piece: Piece, own: &[f64], lines: bool| match piece {
+        Piece::White | Piece::MovingAverage(_) | Piece::Quantization => true,
+        Piece::BandLimit(_) | Piece::Filtered(_) => true,
+        Piece::Oscillation => lines && own[2].exp() < WIDE_LINE * data.dt,
+        Piece::GaussMarkov => lines && own[1].exp() < WIDE_LINE * data.dt,
+        Piece::Flicker | Piece::RandomWalk | Piece::Ramp => false,
+    };
+    let without = |lines: bool| {
+        let of = |(form, logs): (Form, Vec<f64>), at: usize| {
+            let known = form.split(&logs).nth(at).is_some_and(|(piece, own)| wideband(piece, own, lines));
+            if known { form.without(&logs, at) } else { (form, logs) }
+        };
+        (0..base.form.pieces().len()).rev().fold((base.form.clone(), base.logs.clone()), of)
+    };
+    let mut bare = vec![without(false), without(true)];
+    bare.dedup();
+    let level = whittle::level(data);
+    let shapes: Vec<(u8, Vec<f64>)> =
+        orders.flat_map(|order| shapes(order).into_iter().map(move |own| (order, own))).collect();
+    let tried = bare.iter().flat_map(|bare| shapes.iter().map(move |shape| (bare, shape)));
+    let of = |((form, logs), (order, shape)): (&Bare, &OfOrder)| {
+        let own: Vec<f64> = std::iter::once(level).chain(shape.iter().copied()).collect();
+        let (form, logs, fresh) = form.with(logs, Piece::BandLimit(*order), &own);
+        let fit = whittle::climb(data, &form, &logs, &[fresh.start])?;
+        Some((fit.log_likelihood, *order, (form, fit.logs, fresh)))
+    };
+    let tried: Vec<_> = tried.collect();
+    let mut found: Vec<(f64, u8, Start)> = tried.into_par_iter().filter_map(of).collect();
+    found.sort_by(|a, b| a.1.cmp(&b.1).then(b.0.total_cmp(&a.0)));
+    // the best of each order, which is also the one that is searched
+    let best = found.chunk_by(|a, b| a.1 == b.1).filter_map(|of_order| of_order.first());
+    best.map(|(_, _, start)| start.clone()).collect()
+}
+
+/// Logarithms of the area ratios of low-passes of this order from a hundredth of the sample rate up: Butterworth's by the bilinear transform, with
+/// their zeros within the unit circle.
+fn shapes(order: u8) -> Vec<Vec<f64>> {
+    let corners = [0.01, 0.02, 0.04, 0.07, 0.12, 0.18, 0.25, 0.32, 0.4, 0.45];
+    let of = |corner: f64| {
+        let analog = 2.0 * (std::f64::consts::PI * corner).tan();
+        let n = usize::from(order);
+        let pole = |k: usize| {
+            let angle = std::f64::consts::PI * (2 * k + n + 1) as f64 / (2 * n) as f64;
+            let s = Complex::from_polar(analog, angle) * 0.5;
+            let z = (s + 1.0) / (-s + 1.0);
+            if 2 * k + 1 == n { Complex::from(z.re) } else { z }
+        };
+        let poles: Vec<Complex<f64>> = (0..n.div_ceil(2)).map(pole).collect();
+        let filter = Filter::of_roots(&vec![Complex::from(-0.9); n], &poles)?;
+        Some(filter.area_ratios()?.into_iter().map(f64::ln).collect())
+    };
+    corners.into_iter().filter_map(of).collect()
 }
 
 /// One process less, or another in its place.
@@ -163,6 +280,13 @@ fn rearrangements(data: &Ordinates, base: &Fit) -> Vec<Start> {
             continue;
         }
         let (form, logs) = base.form.without(&base.logs, at);
+        if let Piece::BandLimit(order) = *piece {
+            let own = base.form.split(&base.logs).nth(at).map(|(_, own)| own.to_vec()).unwrap_or_default();
+            moves.extend(other_orders(&form, &logs, order, &own));
+            let (form, logs, fresh) = form.with(&logs, Piece::White, &[whittle::level(data)]);
+            moves.push((form, logs, fresh));
+            continue;
+        }
         moves.push((form.clone(), logs.clone(), 0..0));
         let others = stand_ins(*piece, &form);
         if others.is_empty() {
@@ -184,6 +308,25 @@ fn rearrangements(data: &Ordinates, base: &Fit) -> Vec<Start> {
     moves
 }
 
+/// A band limit with a pole and a zero more, at first near the origin, or one less; `form`: without it, `own`: its logarithms.
+fn other_orders(form: &Form, logs: &[f64], order: u8, own: &[f64]) -> Vec<Start> {
+    let (a, b) = own[1..].split_at(usize::from(order));
+    let with = |order: u8, a: Vec<f64>, b: Vec<f64>| {
+        let own: Vec<f64> = own[..1].iter().copied().chain(a).chain(b).collect();
+        form.with(logs, Piece::BandLimit(order), &own)
+    };
+    let mut moves = Vec::new();
+    if order < HIGHEST_ORDER {
+        for (pole, zero) in [(0.3, -0.3), (-0.3, 0.3), (0.3, 0.3)] {
+            moves.push(with(order + 1, [a, &[pole]].concat(), [b, &[zero]].concat()));
+        }
+    }
+    if order > 1 {
+        moves.push(with(order - 1, a[..a.len() - 1].to_vec(), b[..b.len() - 1].to_vec()));
+    }
+    moves
+}
+
 /// What may stand in the place of `piece`; `form`: without it.
 fn stand_ins(piece: Piece, form: &Form) -> Vec<Piece> {
     let mut others = match piece {
@@ -194,7 +337,7 @@ fn stand_ins(piece: Piece, form: &Form) -> Vec<Piece> {
         Piece::MovingAverage(_) => {
             (2..=LONGEST_AVERAGE).map(Piece::MovingAverage).chain([Piece::GaussMarkov]).collect()
         }
-        Piece::Oscillation | Piece::White | Piece::Quantization => vec![],
+        Piece::Oscillation | Piece::White | Piece::Quantization | Piece::BandLimit(_) | Piece::Filtered(_) => vec![],
     };
     let most = |other: &Piece| if *other == Piece::GaussMarkov { MOST_GAUSS_MARKOV } else { 1 };
     others.retain(|other| *other != piece && form.count(other.kind()) < most(other));

@@ -7,10 +7,13 @@ use super::super::shape::Role;
 use super::form::{Form, Piece};
 use super::ordinates::Ordinates;
 use super::whittle::{self, Fit};
+use crate::noise::Kind;
 use crate::numerics::distribution::{NORMAL_90, NORMAL_95, NORMAL_99};
 
 /// Standard deviation of a logarithm from which the likelihood is no parabola any more; of drift parameters, and of others.
 const ROUGH: [f64; 2] = [0.03, 0.15];
+/// Of what is no drift where a band limit of many coefficients would have to be found anew at every step of a profile.
+const ROUGH_BESIDE_A_FILTER: f64 = 0.5;
 /// Of the search for a limit.
 const STEPS: usize = 32;
 
@@ -21,7 +24,7 @@ pub(super) struct Precision {
     pub(super) sigma: f64,
     /// Cramér-Rao bound of the standard deviation, at the estimate.
     pub(super) bound: f64,
-    /// 95 % limits; None where the likelihood stays above its 95 % level up to the end of what is searched.
+    /// 95 % limits, of the shape of a filter none; None where the likelihood stays above its 95 % level up to the end of what is searched.
     pub(super) lower: Option<f64>,
     pub(super) upper: Option<f64>,
     /// The 90 % interval has both ends: one-sided tests at 5 % refuse that there is nothing of it, and that a correlation time has no end
@@ -47,12 +50,25 @@ pub(super) fn precisions(data: &Ordinates, fit: &Fit) -> Vec<Precision> {
     let expected = deviations(whittle::expected_information(data, &fit.form, &fit.logs));
     let observed = deviations(whittle::observed_information(data, fit));
     let bounds = whittle::bounds(data, &fit.form, &fit.logs);
+    let roles = fit.form.roles();
+    let limited = fit.form.has(Kind::BandLimit);
     let mut known: Vec<Precision> = (0..fit.logs.len())
         .into_par_iter()
         .map(|i| {
-            let (sigma, bound) = (observed[i], expected[i]);
-            let drift = fit.form.pieces()[fit.form.roles()[i].0].kind().is_drift();
-            let rough = if drift { ROUGH[0] } else { ROUGH[1] };
+            let (mut sigma, bound) = (observed[i], expected[i]);
+            if roles[i].1 == Role::Shape {
+                return Precision { sigma, bound, lower: None, upper: None, told: true };
+            }
+            let drift = fit.form.pieces()[roles[i].0].kind().is_drift();
+            if limited && !drift && !sigma.is_finite() {
+                // a shape at its bounds makes the observed one singular
+                sigma = bound;
+            }
+            let rough = match (drift, limited) {
+                (true, _) => ROUGH[0],
+                (false, false) => ROUGH[1],
+                (false, true) => ROUGH_BESIDE_A_FILTER,
+            };
             let limits = if sigma < rough {
                 [-1.0, 1.0].map(|side| Ok(fit.logs[i] + side * NORMAL_95 * sigma))
             } else {
@@ -133,7 +149,12 @@ fn profile(data: &Ordinates, fit: &Fit, index: usize, [first, end]: [f64; 2], le
     let inside = |v: f64| if first > 0.0 { v.min(end) } else { v.max(end) };
     let mut at = inside(centre + level * first);
     let mut from = fit.logs.clone();
-    let free: Vec<usize> = (0..from.len()).filter(|i| *i != index).collect();
+    let roles = fit.form.roles();
+    let kind = |i: usize| fit.form.pieces()[roles[i].0].kind();
+    // beside a band limit slow noise is profiled over slow noise and densities: its lines and the shape of its filter stand far away, and would take a search of their own
+    let beside_a_filter = fit.form.has(Kind::BandLimit) && kind(index).is_drift();
+    let far_away = |i: usize| beside_a_filter && (roles[i].1 == Role::Shape || kind(i) == Kind::Oscillation);
+    let free: Vec<usize> = (0..from.len()).filter(|i| *i != index && !far_away(*i)).collect();
     let (mut near, mut far): (f64, Option<f64>) = (centre, None);
     let mut before = 0.0;
     for step in 0..STEPS {

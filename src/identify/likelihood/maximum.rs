@@ -29,6 +29,7 @@ pub fn maximum(start: &NoiseModel, logs: &[Vec<Stretch<'_>>], dt: f64) -> Option
         .map(|(_, role)| match role {
             Role::CorrelationTime => (dt.ln(), longest),
             Role::Frequency => (f64::NEG_INFINITY, (0.5 / dt).ln()),
+            Role::Shape => (-12.0, 12.0),
             Role::Coefficient => (f64::NEG_INFINITY, f64::INFINITY),
         })
         .collect();

@@ -37,8 +37,8 @@ use crate::signal::lines::Line;
 use crate::units::Unit;
 use exact::{Exact, Refined};
 use form::{Form, Piece};
-pub(super) use growth::LONGEST_AVERAGE;
 use growth::score;
+pub(super) use growth::{HIGHEST_ORDER, LONGEST_AVERAGE};
 use interval::{Precision, precisions};
 use names::{name_of, parameter_name, term_name, unit_of};
 use ordinates::Ordinates;
@@ -134,7 +134,7 @@ impl Whole<'_> {
         let Fitted { fit, known, .. } = &fitted;
         let words = Words { data: &data, display };
         let terms = known_terms(&data, fit, known);
-        let all_known = terms.len() == fit.form.pieces().len();
+        let all_known = unknown(&data, fit, known).is_empty();
         let model = NoiseModel { terms: terms.iter().map(|found| found.term).collect() };
         curve.refine(&model);
         let mut not_identified = words.unknown_parameters(fit, known);
@@ -257,8 +257,8 @@ fn fits(data: &Ordinates, choice: &ModelChoice) -> Vec<(Fit, Vec<Precision>)> {
             }
             fits
         }
-        ModelChoice::Terms { kinds, average } => {
-            let forms = forms(kinds, *average);
+        ModelChoice::Terms { kinds, average, order } => {
+            let forms = forms(kinds, *average, *order);
             let fits = forms.par_iter().filter_map(|form| growth::fit(data, form));
             let mut fits: Vec<(Fit, Vec<Precision>)> = fits.map(known).collect();
             fits.sort_by(|a, b| score(&a.0, data).total_cmp(&score(&b.0, data)));
@@ -340,12 +340,14 @@ fn moved(
     interval::keep_open(&before.form, known.iter().enumerate().map(of).collect())
 }
 
-/// The forms that a list of kinds may mean: the length of a moving average may be open.
-fn forms(kinds: &[Kind], average: Option<u32>) -> Vec<Form> {
-    let with_average = |samples: u32| {
+/// The forms that a list of kinds may mean: the length of a moving average, and the order of a band limit, may be open. A band limit brings its own white noise.
+fn forms(kinds: &[Kind], average: Option<u32>, order: Option<u8>) -> Vec<Form> {
+    let limited = kinds.contains(&Kind::BandLimit);
+    let with = |samples: u32, order: u8| {
         let piece = |kind: &Kind| match kind {
             Kind::White => Piece::White,
             Kind::MovingAverage => Piece::MovingAverage(samples),
+            Kind::BandLimit => Piece::BandLimit(order),
             Kind::Quantization => Piece::Quantization,
             Kind::Oscillation => Piece::Oscillation,
             Kind::BiasInstability => Piece::Flicker,
@@ -353,12 +355,13 @@ fn forms(kinds: &[Kind], average: Option<u32>) -> Vec<Form> {
             Kind::RateRandomWalk => Piece::RandomWalk,
             Kind::RateRamp => Piece::Ramp,
         };
-        Form::new(kinds.iter().map(piece).collect())
+        Form::new(kinds.iter().filter(|kind| !(limited && **kind == Kind::White)).map(piece).collect())
     };
-    let mut all: Vec<Form> = match average {
-        Some(samples) => vec![with_average(samples)],
-        None => (2..=LONGEST_AVERAGE).map(with_average).collect(),
-    };
+    let averages = average.map_or(2..=LONGEST_AVERAGE, |samples| samples..=samples);
+    let orders = order.map_or(1..=HIGHEST_ORDER, |order| order..=order);
+    let mut all: Vec<Form> =
+        averages.flat_map(|samples| orders.clone().map(move |order| with(samples, order))).collect();
+    all.sort();
     all.dedup();
     all
 }
@@ -417,11 +420,15 @@ fn known_terms(data: &Ordinates, fit: &Fit, known: &[Precision]) -> Vec<Found> {
             values[0] = values[0].max(0.5 * upper.exp());
         }
         match piece.term(&values) {
-            Some(term) if !indices.clone().any(|i| unknown.contains(&i)) => found.push(Found {
-                term,
-                intervals: of.iter().map(|p| p.interval().map(|limits| limits.map(f64::exp))).collect(),
-                precision: of.iter().map(|p| [p.sigma, p.bound]).collect(),
-            }),
+            Some(term) if !indices.clone().any(|i| unknown.contains(&i)) => {
+                let floor = piece.floor(&values).into_iter();
+                found.extend(floor.map(|term| Found { term, intervals: vec![], precision: vec![[f64::INFINITY; 2]] }));
+                found.push(Found {
+                    term,
+                    intervals: of.iter().map(|p| p.interval().map(|limits| limits.map(f64::exp))).collect(),
+                    precision: of.iter().map(|p| [p.sigma, p.bound]).collect(),
+                })
+            }
             Some(_) => {}
             None => {
                 let sigma = whittle::slope_sigma(data, &fit.form, &fit.logs);

@@ -19,6 +19,7 @@ pub(super) fn unit_of(form: &Form, index: usize, display: &Unit) -> Unit {
     match role {
         Role::CorrelationTime => Unit::second(),
         Role::Frequency => Unit::hertz(),
+        Role::Shape => Unit::one(),
         Role::Coefficient => super::super::coefficient_unit(form.pieces()[piece].kind(), display),
     }
 }
@@ -34,9 +35,10 @@ pub(super) fn parameter_name(kind: Kind, number: usize, role: Role) -> String {
     match role {
         Role::CorrelationTime => format!("{place}.correlation_time"),
         Role::Frequency => format!("{place}.frequency"),
+        Role::Shape => format!("{place}.shape"),
         Role::Coefficient => match kind {
             Kind::GaussMarkov | Kind::Oscillation => format!("{place}.std_dev"),
-            Kind::White | Kind::MovingAverage | Kind::RateRandomWalk => format!("{place}.density"),
+            Kind::White | Kind::MovingAverage | Kind::BandLimit | Kind::RateRandomWalk => format!("{place}.density"),
             Kind::RateRamp => format!("{place}.slope"),
             Kind::Quantization | Kind::BiasInstability => format!("{place}.coefficient"),
         },

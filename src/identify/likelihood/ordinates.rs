@@ -11,6 +11,8 @@ use crate::signal::lines::{Line, find_lines};
 const ALONE: usize = 32;
 /// Relative width of a bin above.
 const WIDTH: f64 = 1.0 / 40.0;
+/// At most this share of the distance to half the sample rate.
+const NYQUIST_WIDTH: f64 = 0.2;
 /// A log with more of its power than this at one frequency is a sinusoid.
 const TONE: f64 = 0.98;
 /// A line's surroundings are binned this finely: each bin is at most this share of its distance from the line.
@@ -182,7 +184,9 @@ fn layout(coefficients: usize, step: f64, lines: &[Line]) -> Vec<(usize, usize)>
     let mut bins = Vec::new();
     let mut first = 0;
     while first < coefficients {
-        let size = width(first + 1, step, lines).min(coefficients - first);
+        // a filter may have a zero at half the sample rate
+        let before_nyquist = ((coefficients - first) as f64 * NYQUIST_WIDTH) as usize;
+        let size = width(first + 1, step, lines).min(before_nyquist.max(1)).min(coefficients - first);
         bins.push((first, size));
         first += size;
     }

@@ -8,8 +8,10 @@
 
 use serde::Serialize;
 
-use super::form::{Form, Piece};
+use super::super::shape::Role;
+use super::form::Form;
 use super::interval::covariance;
+use super::names::name_of;
 use super::ordinates::Ordinates;
 use super::{parameter_name, whittle};
 use crate::noise::{Grid, Kind, NoiseModel, Term};
@@ -68,27 +70,27 @@ pub struct Planned {
 
 impl Planned {
     pub fn new(model: &NoiseModel) -> Planned {
-        let mut pieces: Vec<(Piece, Vec<f64>, usize)> =
-            model.terms.iter().enumerate().map(|(i, term)| (Piece::of(term).0, Piece::of(term).1, i)).collect();
-        pieces.sort_by_key(|(piece, _, _)| *piece);
-        let first = |term: usize| {
-            pieces.iter().take_while(|(_, _, i)| *i != term).map(|(_, values, _)| values.len()).sum::<usize>()
-        };
+        let (form, logs) = Form::of(model);
+        let known: Vec<String> = (0..logs.len()).map(|i| name_of(&form, i)).collect();
+        // none of the white noise that only goes with a band limit
+        let place = |name: &str| known.iter().position(|known| known == name);
         let mut parameters = Vec::new();
         let mut lines = Vec::new();
         for (i, term) in model.terms.iter().enumerate() {
             let kind = term.kind();
             let number = model.terms[..i].iter().filter(|other| other.kind() == kind).count();
             let names = super::super::shape::roles(kind).iter().map(|role| parameter_name(kind, number, *role));
-            let at = first(i);
             match *term {
                 Term::RateRamp { slope } => parameters.extend(names.map(|name| (name, Origin::Slope(slope)))),
-                _ => parameters.extend(names.zip(at..).map(|(name, place)| (name, Origin::Log(place)))),
+                _ => parameters.extend(
+                    names.filter_map(|name| Some((place(&name)?, name))).map(|(at, name)| (name, Origin::Log(at))),
+                ),
             }
             match *term {
                 Term::GaussMarkov { .. } => {
-                    let place = super::term_name(kind, number);
-                    parameters.push((format!("{place}.driving_noise"), Origin::Driving(at, at + 1)));
+                    let at = place(&parameter_name(kind, number, Role::Coefficient));
+                    let name = format!("{}.driving_noise", super::term_name(kind, number));
+                    parameters.extend(at.map(|at| (name, Origin::Driving(at, at + 1))));
                 }
                 Term::Oscillation { frequency_hz, correlation_time, .. } => {
                     lines.push((frequency_hz, correlation_time));
@@ -96,7 +98,6 @@ impl Planned {
                 _ => {}
             }
         }
-        let (form, logs) = Form::of(model);
         Planned { form, logs, parameters, lines }
     }
 

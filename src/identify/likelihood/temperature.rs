@@ -374,7 +374,9 @@ fn pairs(without: &Fitted, with: &Fitted, display: &Unit) -> Vec<Pair> {
         let interval = [lower.map_or(0.0, f64::exp), upper.map_or(f64::INFINITY, f64::exp)];
         Measured::from_si(of.fit.logs[index].exp(), Some(interval), unit_of(form, index, display))
     };
+    let roles = form.roles();
     let mut pairs: Vec<Pair> = (0..without.fit.logs.len())
+        .filter(|i| roles[*i].1 != Role::Shape)
         .map(|i| Pair { parameter: name_of(form, i), without: value(without, i), with: value(with, i) })
         .collect();
     if form.has(Kind::RateRamp) {

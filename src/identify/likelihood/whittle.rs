@@ -6,7 +6,7 @@
 //! inverse is the Cramér-Rao bound.
 //! Sources: Whittle 1953; Kay 1993, section 3.11 (asymptotic bound).
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use slsqp::{Func, StopTols, minimize};
 
 use super::super::shape::Role;
@@ -18,8 +18,17 @@ use crate::noise::{Kind, Term};
 const SHORTEST: f64 = 0.3;
 /// That of a drift; what is shorter is wideband noise: white, and averaged by the sensor.
 const SHORTEST_DRIFT: f64 = 2.0;
+/// Both beside a band limit: a process that forgets sooner is part of the filter.
+pub(super) const WIDE_LINE: f64 = 30.0;
 /// And at most so many lengths of the log; beyond it a Gauss-Markov process is a random walk.
 const LONGEST: f64 = 10.0;
+/// Logarithm of an area ratio: a pole or zero within 10⁻⁵ of the unit circle.
+const STEEPEST: f64 = 12.0;
+/// Logarithm of the density of a band limit over that of white noise of the same power, at most.
+const LOUDEST: f64 = 7.0;
+/// Steps of scoring at most, and the gain in ln L of one that ends them.
+const SCORING_STEPS: usize = 40;
+const SCORED: f64 = 1e-5;
 /// A maximum is found when another step would gain half of this in ln L.
 pub(super) const WELL: f64 = 1e-2;
 /// What a step may be, in logarithms: where the log says next to nothing, the parabola reaches further than it is true.
@@ -62,29 +71,41 @@ pub(super) fn spectrum_of(data: &Ordinates, form: &Form, logs: &[f64]) -> Vec<f6
 /// What stays while others are searched: the pieces of which no logarithm is free.
 struct Held {
     fixed: Vec<bool>,
+    /// The shape of a band limit stays, too.
+    shape: bool,
     /// Their spectrum.
     total: Vec<f64>,
 }
 
 impl Held {
     fn nothing(data: &Ordinates, form: &Form) -> Held {
-        Held { fixed: vec![false; form.pieces().len()], total: vec![0.0; data.bins.len()] }
+        Held { fixed: vec![false; form.pieces().len()], shape: false, total: vec![0.0; data.bins.len()] }
     }
 
     fn new(data: &Ordinates, form: &Form, logs: &[f64], free: &[usize]) -> Held {
         let mut held = Held::nothing(data, form);
+        held.shape = !free.iter().any(|i| form.roles()[*i].1 == Role::Shape);
         let mut first = 0;
         for (fixed, (piece, own)) in held.fixed.iter_mut().zip(form.split(logs)) {
             let indices = first..first + own.len();
             first = indices.end;
             *fixed = !free.iter().any(|i| indices.contains(i));
             let values: Vec<f64> = own.iter().map(|v| v.exp()).collect();
-            if let Some(term) = piece.term(&values).filter(|_| *fixed) {
-                held.total.iter_mut().zip(term.psd_on(&data.grid)).for_each(|(t, psd)| *t += psd);
+            if *fixed {
+                add(&mut held.total, piece, &values, data);
             }
         }
         held
     }
+}
+
+/// The spectrum of one piece on top; none that is finite where there is no such process.
+fn add(total: &mut [f64], piece: Piece, values: &[f64], data: &Ordinates) {
+    let mut terms = piece.terms(values).peekable();
+    if terms.peek().is_none() && !piece.roles().is_empty() {
+        total.fill(f64::INFINITY);
+    }
+    terms.for_each(|term| total.iter_mut().zip(term.psd_on(&data.grid)).for_each(|(t, psd)| *t += psd));
 }
 
 fn spectrum(data: &Ordinates, form: &Form, logs: &[f64], held: &Held, with_derivatives: bool) -> Spectrum {
@@ -100,7 +121,9 @@ fn spectrum(data: &Ordinates, form: &Form, logs: &[f64], held: &Held, with_deriv
         let at = |index: usize, shift: f64| {
             let values: Vec<f64> =
                 own.iter().enumerate().map(|(i, v)| if i == index { (v + shift).exp() } else { v.exp() }).collect();
-            piece.term(&values).map(|term| term.psd_on(&data.grid)).unwrap_or_default()
+            let mut psd = vec![0.0; data.bins.len()];
+            add(&mut psd, piece, &values, data);
+            psd
         };
         if own.is_empty() {
             continue;
@@ -108,10 +131,15 @@ fn spectrum(data: &Ordinates, form: &Form, logs: &[f64], held: &Held, with_deriv
         let psd = at(0, 0.0);
         total.iter_mut().zip(&psd).for_each(|(t, p)| *t += p);
         if with_derivatives {
+            let shapes = if held.shape { None } else { shape_derivatives(data, piece, own) };
             for (i, role) in piece.roles().iter().enumerate() {
                 derivatives.push(match role {
                     Role::Coefficient => psd.iter().map(|p| 2.0 * p).collect(),
-                    Role::CorrelationTime | Role::Frequency => {
+                    Role::Shape if held.shape => Vec::new(),
+                    Role::Shape if shapes.is_some() => {
+                        shapes.as_ref().and_then(|all| all.get(i - 1)).cloned().unwrap_or_default()
+                    }
+                    Role::CorrelationTime | Role::Frequency | Role::Shape => {
                         // a line is as narrow as its correlation time is long
                         let step = match (role, piece) {
                             (Role::Frequency, Piece::Oscillation) => STEP.min(1e-2 / (own[1] + own[2]).exp()),
@@ -125,6 +153,17 @@ fn spectrum(data: &Ordinates, form: &Form, logs: &[f64], held: &Held, with_deriv
         }
     }
     Spectrum { total, derivatives }
+}
+
+/// ∂S/∂θ by each logarithm of the shape of a band limit, its floor included; `None` for other pieces.
+fn shape_derivatives(data: &Ordinates, piece: Piece, own: &[f64]) -> Option<Vec<Vec<f64>>> {
+    matches!(piece, Piece::BandLimit(_)).then_some(())?;
+    let values: Vec<f64> = own.iter().map(|v| v.exp()).collect();
+    let (psd, floor) = (piece.term(&values)?.psd_on(&data.grid), piece.floor(&values)?.psd_on(&data.grid));
+    let of = |(slope, level): &(Vec<f64>, f64)| {
+        psd.iter().zip(&floor).zip(slope).map(|((p, f), s)| p * s + f * level).collect()
+    };
+    Some(data.grid.shape_slopes(&values[1..])?.iter().map(of).collect())
 }
 
 /// The slope of a ramp that the log suggests under this spectrum, and its standard deviation.
@@ -172,16 +211,34 @@ fn information(data: &Ordinates, form: &Form, logs: &[f64], held: &Held) -> DMat
 /// Rows of held pieces are zero.
 fn information_of(data: &Ordinates, Spectrum { total, derivatives }: &Spectrum) -> DMatrix<f64> {
     let p = derivatives.len();
-    let weights: Vec<f64> = data.bins.iter().zip(total).map(|(bin, s)| 0.5 * bin.count / (s * s)).collect();
+    let weights: Vec<f64> = data.bins.iter().zip(total).map(|(bin, s)| (0.5 * bin.count).sqrt() / s).collect();
+    let weighted = |own: &Vec<f64>| own.iter().zip(&weights).map(|(d, w)| d * w).collect::<Vec<f64>>();
+    let derivatives: Vec<Vec<f64>> = derivatives.iter().map(weighted).collect();
     let mut information = DMatrix::zeros(p, p);
     for i in 0..p {
         for k in 0..=i {
-            let products = weights.iter().zip(&derivatives[i]).zip(&derivatives[k]);
-            information[(i, k)] = products.map(|((w, a), b)| w * a * b).sum();
+            information[(i, k)] = dot(&derivatives[i], &derivatives[k]);
         }
     }
     information.fill_upper_triangle_with_lower_triangle();
     information
+}
+
+/// Σ a b in four sums, which the processor takes side by side; 0 with a held piece, which has none.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let (fours, rest) = a.as_chunks::<4>();
+    let (others, end) = b.as_chunks::<4>();
+    let mut sums = [0.0; 4];
+    for (a, b) in fours.iter().zip(others) {
+        for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
+            *sum += a * b;
+        }
+    }
+    if a.len() == b.len() {
+        sums.iter().sum::<f64>() + rest.iter().zip(end).map(|(a, b)| a * b).sum::<f64>()
+    } else {
+        0.0
+    }
 }
 
 /// Second derivatives of −ln L by the logarithms.
@@ -220,7 +277,10 @@ pub(super) fn log_likelihood(data: &Ordinates, form: &Form, logs: &[f64]) -> f64
 
 /// Bounds of the logarithms; a line stays where the bins are as fine as around its start, and no narrower than they are.
 pub(super) fn bounds(data: &Ordinates, form: &Form, start: &[f64]) -> Vec<(f64, f64)> {
-    let [shortest, shortest_drift] = [SHORTEST, SHORTEST_DRIFT].map(|samples| (samples * data.dt).ln());
+    // what is wider than a line beside a band limit is part of that
+    let limited = form.has(Kind::BandLimit);
+    let least = if limited { [WIDE_LINE; 2] } else { [SHORTEST, SHORTEST_DRIFT] };
+    let [shortest, shortest_drift] = least.map(|samples| (samples * data.dt).ln());
     let of = |(piece, own): (Piece, &[f64])| {
         let touch = touch(data, piece);
         let coefficient = (touch.0 - 9.0, touch.1 + 5.0);
@@ -228,10 +288,14 @@ pub(super) fn bounds(data: &Ordinates, form: &Form, start: &[f64]) -> Vec<(f64, 
             Piece::Oscillation => {
                 let (low, high, width) = data.fine_around(own[1].exp());
                 let longest = (1.0 / (std::f64::consts::PI * width)).min(data.span_s());
-                vec![coefficient, (low.ln(), high.ln()), (shortest, longest.ln())]
+                vec![coefficient, (low.ln(), high.ln()), (shortest, longest.ln().max(shortest))]
             }
             Piece::GaussMarkov => vec![coefficient, (shortest_drift, (LONGEST * data.span_s()).ln())],
             Piece::Ramp => vec![],
+            Piece::BandLimit(_) => {
+                let shape = piece.roles()[1..].iter().map(|_| (-STEEPEST, STEEPEST));
+                std::iter::once((level(data) - LOUDEST, level(data) + LOUDEST)).chain(shape).collect()
+            }
             // as far as all power together
             Piece::White => vec![(coefficient.0, coefficient.1.max(level(data) + 1.0))],
             _ => vec![coefficient],
@@ -251,6 +315,7 @@ fn touch(data: &Ordinates, piece: Piece) -> (f64, f64) {
     let ends: Vec<Vec<f64>> = match piece {
         Piece::GaussMarkov => [SHORTEST_DRIFT * data.dt, LONGEST * data.span_s()].map(|time| vec![1.0, time]).into(),
         Piece::Oscillation => [SHORTEST * data.dt, data.span_s()].map(|time| vec![1.0, 0.25 / data.dt, time]).into(),
+        Piece::BandLimit(_) => vec![],
         _ => vec![vec![1.0]],
     };
     let of = |values: &Vec<f64>| piece.term(values).map(|term| touching(data, &term));
@@ -287,9 +352,13 @@ pub(super) fn climb(data: &Ordinates, form: &Form, start: &[f64], free: &[usize]
         at[*i] = at[*i].clamp(bounds[*i].0, bounds[*i].1);
     }
     let held = Held::new(data, form, &at, free);
+    let scored = form.has(Kind::BandLimit);
+    if scored {
+        scoring(data, form, &mut at, &held, free, &bounds);
+    }
     let mut best = objective(data, form, &at, &held, None);
     for _ in 0..8 {
-        if free.is_empty() {
+        if free.is_empty() || scored {
             break;
         }
         let information = information(data, form, &at, &held);
@@ -338,6 +407,56 @@ pub(super) fn climb(data: &Ordinates, form: &Form, start: &[f64], free: &[usize]
         }
     }
     best.is_finite().then(|| finish(data, form, at, best, free, &bounds))
+}
+
+/// Steps of Fisher's scoring, damped (Levenberg 1944, Marquardt 1963), until another would gain less than [`SCORED`]: coefficients of a filter go together as no
+/// search that has to learn it from slopes can know. How far it is from the end is told by the decrement.
+fn scoring(data: &Ordinates, form: &Form, at: &mut [f64], held: &Held, free: &[usize], bounds: &[(f64, f64)]) {
+    let mut damping = 1e-2;
+    let mut value = objective(data, form, at, held, None);
+    for _ in 0..SCORING_STEPS {
+        let spectrum = spectrum(data, form, at, held, true);
+        let mut gradient = vec![0.0; at.len()];
+        objective_of(data, form, &spectrum, Some(&mut gradient));
+        let information = information_of(data, &spectrum);
+        // what is at a bound and would leave stays there
+        let leaves = |i: &usize| {
+            (at[*i] <= bounds[*i].0 && gradient[*i] > 0.0) || (at[*i] >= bounds[*i].1 && gradient[*i] < 0.0)
+        };
+        let free: Vec<usize> = free.iter().copied().filter(|i| !leaves(i)).collect();
+        let slope = DVector::from_fn(free.len(), |i, _| -gradient[free[i]]);
+        if free.is_empty() || !slope.iter().all(|g| g.is_finite()) {
+            return;
+        }
+        let mut gain = 0.0;
+        let next = std::iter::from_fn(|| {
+            let part = DMatrix::from_fn(free.len(), free.len(), |i, k| {
+                let own = information[(free[i], free[k])];
+                if i == k { own * (1.0 + damping) + 1e-3 * damping } else { own }
+            });
+            damping *= 4.0;
+            Some(nalgebra::Cholesky::new(part).map(|part| part.solve(&slope)))
+        })
+        .take(12)
+        .flatten()
+        .find_map(|step| {
+            let mut next = at.to_vec();
+            for (i, s) in free.iter().zip(step.iter()) {
+                next[*i] = (next[*i] + s.clamp(-REACH, REACH)).clamp(bounds[*i].0, bounds[*i].1);
+            }
+            let found = objective(data, form, &next, held, None);
+            gain = value - found;
+            (gain > 0.0).then_some((next, found))
+        });
+        // no step leads up, however short
+        let Some((next, found)) = next else { return };
+        at.copy_from_slice(&next);
+        value = found;
+        damping = (damping / 40.0).max(1e-9);
+        if gain < SCORED {
+            return;
+        }
+    }
 }
 
 /// The same by all logarithms.

@@ -31,7 +31,13 @@ impl Words<'_> {
     pub(super) fn unknown_parameters(&self, fit: &Fit, known: &[Precision]) -> Vec<NotIdentified> {
         let line = |i: &usize| fit.form.pieces()[fit.form.roles()[*i].0] != Piece::Oscillation;
         let open = |i: &usize| known[*i].open();
-        (0..known.len()).filter(open).filter(line).map(|i| self.not_identified(fit, i, &known[i])).collect()
+        let shape = |i: &usize| fit.form.roles()[*i].1 == Role::Shape;
+        (0..known.len())
+            .filter(open)
+            .filter(line)
+            .filter(|i| !shape(i))
+            .map(|i| self.not_identified(fit, i, &known[i]))
+            .collect()
     }
 
     /// Lines as narrow as the log is long: how long their correlation times are at least.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use kfdesign::identify::{Identified, ModelChoice, parse_model};
-use kfdesign::noise::{Kind, Term};
+use kfdesign::noise::{Filter, Kind, Term};
 use rayon::prelude::*;
 
 use super::super::{gauss_markov, log, white};
@@ -160,7 +160,15 @@ fn likelihood_study_of_model_choice() {
     let line = Term::Oscillation { std_dev: 0.05, frequency_hz: 20.0, correlation_time: 10.0 };
     let average = Term::MovingAverage { density: 0.05, samples: 2 };
     let walk = Term::RateRandomWalk { density: SIGMA * (2.0 / TC).sqrt() };
-    let cases: [(&str, Vec<Term>, usize, f64); 11] = [
+    let low_pass = Filter::new(&[1.0, 2.0, 1.0], &[1.0, -1.142_980_502_539_901_1, 0.412_801_598_096_188_77]).unwrap();
+    let limited = Term::BandLimit { density: 0.05, filter: low_pass };
+    let cases: [(&str, Vec<Term>, usize, f64); 12] = [
+        (
+            "low-pass of order 2 at a tenth of the rate + gm, 2 h at 10 Hz",
+            vec![white(0.0005), limited, gauss_markov(SIGMA, TC)],
+            72_000,
+            0.1,
+        ),
         ("white, 2 h at 10 Hz", vec![white(N)], 72_000, 0.1),
         ("white + gm, 2 h at 10 Hz", vec![white(N), gauss_markov(SIGMA, TC)], 72_000, 0.1),
         (

@@ -5,6 +5,7 @@ use super::super::shape::Role;
 use super::exact::Exact;
 use super::form::Form;
 use super::ordinates::Ordinates;
+use super::whittle::STEEPEST;
 use crate::filter::likelihood::Stretch;
 use crate::noise::{Grid, Kind, NoiseModel};
 
@@ -29,7 +30,7 @@ pub fn maximum(start: &NoiseModel, logs: &[Vec<Stretch<'_>>], dt: f64) -> Option
         .map(|(_, role)| match role {
             Role::CorrelationTime => (dt.ln(), longest),
             Role::Frequency => (f64::NEG_INFINITY, (0.5 / dt).ln()),
-            Role::Shape => (-12.0, 12.0),
+            Role::Shape => (-STEEPEST, STEEPEST),
             Role::Coefficient => (f64::NEG_INFINITY, f64::INFINITY),
         })
         .collect();

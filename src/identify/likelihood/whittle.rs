@@ -23,7 +23,7 @@ pub(super) const WIDE_LINE: f64 = 30.0;
 /// And at most so many lengths of the log; beyond it a Gauss-Markov process is a random walk.
 const LONGEST: f64 = 10.0;
 /// Logarithm of an area ratio: a pole or zero within 10⁻⁵ of the unit circle.
-const STEEPEST: f64 = 12.0;
+pub(super) const STEEPEST: f64 = 12.0;
 /// Logarithm of the density of a band limit over that of white noise of the same power, at most.
 const LOUDEST: f64 = 7.0;
 /// Steps of scoring at most, and the gain in ln L of one that ends them.

@@ -117,6 +117,11 @@ impl Following {
                 }
             }
         }
+        for (i, place) in self.places.iter().enumerate() {
+            if let Some(place) = place.filter(|_| new.h[(0, i)] != self.built.h[(0, i)]) {
+                model.h[(0, place)] = new.h[(0, i)];
+            }
+        }
         model.r[(0, 0)] += new.r[(0, 0)] - self.built.r[(0, 0)];
         Some(model)
     }
@@ -145,12 +150,14 @@ fn holds(model: &LinearModel, built: &LinearModel, moved: &LinearModel, places: 
     let same = |own: f64, built: f64| (own - built).abs() <= SAME * built.abs();
     let pairs = || (0..places.len()).flat_map(|i| (0..places.len()).map(move |k| (i, k)));
     let matrices = [(&model.f, &built.f, &moved.f), (&model.q, &built.q, &moved.q)];
+    let seen = |i: usize| places[i].is_some_and(|place| same(model.h[(0, place)], built.h[(0, i)]));
     let belongs = |own: &DMatrix<f64>, built_part: &DMatrix<f64>, (i, k): (usize, usize)| {
         let place = places[i].zip(places[k]);
-        place.is_some_and(|place| same(own[place], built_part[(i, k)]) && same(model.h[(0, place.0)], built.h[(0, i)]))
+        place.is_some_and(|place| same(own[place], built_part[(i, k)])) && seen(i)
     };
     // flicker faster than the log is part of R, so it may be larger
     model.r[(0, 0)] >= built.r[(0, 0)] * (1.0 - SAME)
+        && (0..places.len()).filter(|i| moved.h[(0, *i)] != built.h[(0, *i)]).all(seen)
         && matrices.iter().all(|(own, built, moved)| {
             pairs().filter(|pair| moved[*pair] != built[*pair]).all(|pair| belongs(own, built, pair))
         })

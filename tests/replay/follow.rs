@@ -3,7 +3,7 @@
 use kfdesign::consistency::Verdict;
 use kfdesign::filter::FilterDesign;
 use kfdesign::identify::Follower;
-use kfdesign::noise::{NoiseModel, Term};
+use kfdesign::noise::{Filter, NoiseModel, Term};
 use kfdesign::numerics::random::{StreamId, stream};
 use kfdesign::params::Params;
 use kfdesign::replay::{AxisResult, Estimates, LogShape, Options, Replayer};
@@ -28,6 +28,16 @@ fn path(terms: &[Term], samples: usize, seed: u64, run: u64) -> Vec<f64> {
 
 fn line(std_dev: f64, frequency_hz: f64, correlation_time: f64) -> Term {
     Term::Oscillation { std_dev, frequency_hz, correlation_time }
+}
+
+/// Two zeros, two poles.
+fn low_pass(zeros: [f64; 2], poles: [f64; 2]) -> Filter {
+    Filter::new(&[1.0, zeros[0], zeros[1]], &[1.0, poles[0], poles[1]]).unwrap()
+}
+
+/// As `identify` writes a band limit: with white noise of 1e-5 of the variance of its innovations.
+fn limited(density: f64, filter: Filter) -> [Term; 2] {
+    [Term::White { density: density * 1e-5_f64.sqrt() * filter.numerator()[0] }, Term::BandLimit { density, filter }]
 }
 
 /// params.json of one axis, rad/s and 100 Hz, its bias known.
@@ -121,7 +131,7 @@ fn what_says_nothing_moves_nothing() {
 /// the design, for its fast states are part of R. The pole of the drift (10 s and less) has 100 s for it: e⁻¹⁰ of what differs, some per mille.
 #[test]
 fn the_filter_is_that_of_what_was_found() {
-    let kinds: [Vec<Term>; 2] = [
+    let kinds: [Vec<Term>; 3] = [
         vec![
             Term::White { density: 0.002 },
             Term::MovingAverage { density: 0.001, samples: 3 },
@@ -135,6 +145,11 @@ fn the_filter_is_that_of_what_was_found() {
             Term::GaussMarkov { std_dev: 0.005, correlation_time: 0.05 },
             Term::BiasInstability { coefficient: 1e-5 },
         ],
+        [
+            &limited(0.002, low_pass([0.5, 0.06], [-1.0, 0.4]))[..],
+            &[Term::GaussMarkov { std_dev: 0.002, correlation_time: 3.0 }],
+        ]
+        .concat(),
     ];
     for terms in kinds {
         let mut true_terms = terms.clone();
@@ -142,6 +157,9 @@ fn the_filter_is_that_of_what_was_found() {
             *term = match *term {
                 Term::White { density } => Term::White { density: 1.3 * density },
                 Term::Oscillation { std_dev, correlation_time, .. } => line(2.0 * std_dev, 11.9, correlation_time),
+                Term::BandLimit { density, .. } => {
+                    Term::BandLimit { density: 3.0 * density, filter: low_pass([0.6, 0.1], [-0.4, 0.1]) }
+                }
                 term => term,
             };
         }
@@ -151,9 +169,15 @@ fn the_filter_is_that_of_what_was_found() {
         let found = result.follow.unwrap();
         assert_eq!(found.changes, 1);
         let value = |name: &str| found.parameters.iter().find(|p| p.parameter == name).map(|p| p.now);
+        let coefficients = |name: &str| [0, 1, 2].map(|k| value(&format!("band_limit.{name}[{k}]")).unwrap());
+        let limit = value("band_limit.density").map(|density| {
+            limited(density, Filter::new(&coefficients("numerator"), &coefficients("denominator")).unwrap())
+        });
         let end: Vec<Term> = terms
             .iter()
             .map(|term| match *term {
+                Term::White { .. } if limit.is_some() => limit.unwrap()[0],
+                Term::BandLimit { .. } => limit.unwrap()[1],
                 Term::White { .. } => Term::White { density: value("white.density").unwrap() },
                 Term::MovingAverage { samples, .. } => {
                     Term::MovingAverage { density: value("moving_average.density").unwrap(), samples }

@@ -5,7 +5,7 @@
 //!
 //! −ln L(θ) = ½ Σ_j [(1 + w) ln S_j + (dt c_j² + w S⁰_j)/S_j].
 //!
-//! Only what is no drift (also Gauss-Markov processes of a few samples) is free: a window says less about slow noise than the log of the design did.
+//! Only what is no drift (also Gauss-Markov processes of a few samples) is free, the shape of a filter that was searched included: a window says less about slow noise than the log of the design did.
 //! Sources: Whittle 1953; Mehra 1972 (adaptive filtering by maximum likelihood); Bernardo & Smith 2000, section 5.2 (conjugate priors as data).
 
 use schemars::JsonSchema;
@@ -18,7 +18,7 @@ use super::ordinates::Ordinates;
 use super::sums::counts_as_white;
 use super::whittle;
 use crate::identify::FEWEST_SAMPLES;
-use crate::noise::{Kind, NoiseModel, Term};
+use crate::noise::{Filter, Kind, NoiseModel, Term};
 use crate::signal::lines::Line;
 use crate::units::Unit;
 
@@ -59,9 +59,7 @@ impl Follower {
             first = indices.end;
             let term = piece.term(&own.iter().map(|v| v.exp()).collect::<Vec<f64>>());
             let wideband = term.is_some_and(|term| counts_as_white(&term, dt));
-            // a window says little of the shape of a filter
-            let moves = piece.roles().iter().map(|role| wideband && *role != Role::Shape);
-            free.extend(indices.zip(moves).filter(|(_, moves)| *moves).map(|(i, _)| i));
+            free.extend(indices.filter(|_| wideband));
         }
         Follower { design: logs.clone(), now: logs, free, form, dt, memory }
     }
@@ -113,15 +111,38 @@ impl Follower {
         NoiseModel { terms: self.form.terms(logs).filter(|term| term.kind() != Kind::BiasInstability).collect() }
     }
 
-    /// `unit`: of the log, SI.
+    /// `unit`: of the log, SI. The shape of a filter by its coefficients.
     pub fn parameters(&self, unit: &Unit) -> Vec<Followed> {
+        let roles = self.form.roles();
         let unit = |i: usize| unit_of(&self.form, i, unit).text().to_string();
-        let of = |&i: &usize| Followed {
-            parameter: name_of(&self.form, i),
-            unit: unit(i),
-            design: self.design[i].exp(),
-            now: self.now[i].exp(),
-        };
-        self.free.iter().map(of).collect()
+        let mut all = Vec::new();
+        for &i in &self.free {
+            let named = |parameter: String, design: f64, now: f64| Followed { parameter, unit: unit(i), design, now };
+            let (piece, role) = roles[i];
+            if role != Role::Shape {
+                all.push(named(name_of(&self.form, i), self.design[i].exp(), self.now[i].exp()));
+            } else if roles[i - 1].1 != Role::Shape {
+                let (Some(design), Some(now)) = (self.filter(piece, &self.design), self.filter(piece, &self.now))
+                else {
+                    continue;
+                };
+                for (which, of) in
+                    [("numerator", Filter::numerator as fn(&Filter) -> &[f64]), ("denominator", Filter::denominator)]
+                {
+                    let pairs = of(&design).iter().zip(of(&now)).enumerate();
+                    all.extend(pairs.map(|(k, (from, to))| named(format!("band_limit.{which}[{k}]"), *from, *to)));
+                }
+            }
+        }
+        all
+    }
+
+    /// That of a piece which is a band limit.
+    fn filter(&self, piece: usize, logs: &[f64]) -> Option<Filter> {
+        let (piece, own) = self.form.split(logs).nth(piece)?;
+        match piece.term(&own.iter().map(|v| v.exp()).collect::<Vec<f64>>())? {
+            Term::BandLimit { filter, .. } => Some(filter),
+            _ => None,
+        }
     }
 }

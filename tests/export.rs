@@ -329,6 +329,28 @@ fn density_at_low_frequencies() {
     assert!(!bench.ok("export gyro.json --to kalibr").contains(words));
 }
 
+/// N of a band limit keeps its interval beside the floor that a filter needs, a hundredth of it at most; beside white noise that counts there is none.
+#[test]
+fn a_band_limit_gives_n_with_its_interval() {
+    let bench = bench();
+    let white = r#""white": {"density": {"value": 0.0562, "unit": "deg/s/sqrt(Hz)", "interval": [0.0555, 0.0569]}}"#;
+    let limited = |floor: f64| {
+        GYRO.replace(
+            white,
+            &format!(
+                r#""white": {{"density": "{floor} deg/s/sqrt(Hz)"}}, "band_limit": {{"density": {{"value": 0.0562, "unit": "deg/s/sqrt(Hz)", "interval": [0.0555, 0.0569]}}, "numerator": [1, 0.5], "denominator": [1, -0.5]}}"#
+            ),
+        )
+    };
+    for (floor, told) in [(5e-4, true), (6e-4, false), (0.03, false)] {
+        bench.file("limited.json", limited(floor));
+        let text = bench.ok("export limited.json --to kalibr");
+        close(field(&text, "gyroscope_noise_density:").to_degrees(), 0.0562_f64.hypot(floor));
+        // 0.0555 deg/s/sqrt(Hz) in rad
+        assert_eq!(text.contains("9.68657735e-04"), told, "{floor}: {text}");
+    }
+}
+
 /// One number for three axes, walks and their price, what is left out, and ranges.
 #[test]
 fn choices_are_said_in_the_file() {

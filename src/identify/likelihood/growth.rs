@@ -98,23 +98,43 @@ type OfOrder = (u8, Vec<f64>);
 /// A form with logarithms to climb from, and which of them are new.
 type Start = (Form, Vec<f64>, Range<usize>);
 
-/// Grows a model on `data`.
+/// Grows a model on `data`: without a band limit first, which would take the power of lines for a resonance of its own; then with one in place of what stands
+/// for it there, and with one from the beginning.
 pub(super) fn grow(data: &Ordinates) -> Visited {
     let mut visited = Visited::default();
     let white = Form::new(vec![Piece::White]);
-    let Some(mut best) = whittle::climb_all(data, &white, &[whittle::level(data)]) else { return visited };
-    visited.keep(best.clone());
+    let Some(white) = whittle::climb_all(data, &white, &[whittle::level(data)]) else { return visited };
+    visited.keep(white.clone());
+    let best = grown(data, &mut visited, white.clone(), 0);
+    let limited = band_limits(data, &best, 1..=FIRST_ORDERS);
+    let limited = best_of(data, &mut visited, limited);
+    if best.form.split(&best.logs).any(|(piece, own)| stands_for_a_limit(data, piece, own)) {
+        // it may have to grow before it is better
+        for start in limited.into_iter().chain([white]) {
+            grown(data, &mut visited, start, FIRST_ORDERS);
+        }
+    } else if let Some(limited) = limited.filter(|limited| score(limited, data) < score(&best, data)) {
+        grown(data, &mut visited, limited, FIRST_ORDERS);
+    }
+    visited
+}
+
+/// By rounds of additions and rearrangements, until none is better; `orders`: of a band limit that may be added.
+fn grown(data: &Ordinates, visited: &mut Visited, mut best: Fit, orders: u8) -> Fit {
     for _ in 0..ROUNDS {
         let mut moves = additions(data, &best);
-        let grown = better(data, &mut visited, &best, moves);
+        if !best.form.has(Kind::BandLimit) {
+            moves.extend(band_limits(data, &best, 1..=orders));
+        }
+        let grown = better(data, visited, &best, moves);
         moves = rearrangements(data, grown.as_ref().unwrap_or(&best));
-        let rearranged = better(data, &mut visited, grown.as_ref().unwrap_or(&best), moves);
+        let rearranged = better(data, visited, grown.as_ref().unwrap_or(&best), moves);
         match rearranged.or(grown) {
             Some(next) => best = next,
             None => break,
         }
     }
-    visited
+    best
 }
 
 /// The maximum of one given form, from many starts.
@@ -154,9 +174,14 @@ pub(super) fn fit(data: &Ordinates, form: &Form) -> Option<Fit> {
 }
 
 /// The best of the fits from `moves`, if its score is lower than that of `best`.
+fn better(data: &Ordinates, visited: &mut Visited, best: &Fit, moves: Vec<Start>) -> Option<Fit> {
+    best_of(data, visited, moves).filter(|fit| score(fit, data) < score(best, data) - 1e-6)
+}
+
+/// The best of the fits from `moves`.
 ///
 /// First only what is new and the white noise are searched; what then looks best is searched as a whole.
-fn better(data: &Ordinates, visited: &mut Visited, best: &Fit, moves: Vec<Start>) -> Option<Fit> {
+fn best_of(data: &Ordinates, visited: &mut Visited, moves: Vec<Start>) -> Option<Fit> {
     let rough = |(form, logs, fresh): &Start| {
         let white = form.roles().iter().position(|(piece, _)| form.pieces()[*piece] == Piece::White);
         let free: Vec<usize> = white.into_iter().filter(|i| !fresh.contains(i)).chain(fresh.clone()).collect();
@@ -174,7 +199,7 @@ fn better(data: &Ordinates, visited: &mut Visited, best: &Fit, moves: Vec<Start>
     for fit in found {
         visited.keep(fit);
     }
-    chosen.filter(|fit| score(fit, data) < score(best, data) - 1e-6)
+    chosen
 }
 
 /// One process more.
@@ -200,11 +225,7 @@ fn additions(data: &Ordinates, base: &Fit) -> Vec<Start> {
             pieces.push(piece);
         }
     }
-    let mut moves: Vec<Start> = pieces.into_iter().flat_map(|piece| starts(data, base, piece)).collect();
-    if !limited {
-        moves.extend(band_limits(data, base, 1..=FIRST_ORDERS));
-    }
-    moves
+    pieces.into_iter().flat_map(|piece| starts(data, base, piece)).collect()
 }
 
 /// Not more than a band limit is: it is forgotten soon, so that it takes no drift, and its density is that of the noise, no part of it that is hidden below
@@ -216,14 +237,23 @@ fn limits(fit: &Fit) -> bool {
     })
 }
 
+/// Wideband noise that is not white; `own`: its logarithms.
+fn stands_for_a_limit(data: &Ordinates, piece: Piece, own: &[f64]) -> bool {
+    let short = |time: f64| time.exp() < WIDE_LINE * data.dt;
+    match piece {
+        Piece::MovingAverage(_) | Piece::Quantization | Piece::BandLimit(_) | Piece::Filtered(_) => true,
+        Piece::Oscillation => short(own[2]),
+        Piece::GaussMarkov => short(own[1]),
+        Piece::White | Piece::Flicker | Piece::RandomWalk | Piece::Ramp => false,
+    }
+}
+
 /// A band limit in place of the wideband noise of `base`; also of its wide lines, which may have stood for it.
 fn band_limits(data: &Ordinates, base: &Fit, orders: RangeInclusive<u8>) -> Vec<Start> {
     let wideband = |piece: Piece, own: &[f64], lines: bool| match piece {
-        Piece::White | Piece::MovingAverage(_) | Piece::Quantization => true,
-        Piece::BandLimit(_) | Piece::Filtered(_) => true,
-        Piece::Oscillation => lines && own[2].exp() < WIDE_LINE * data.dt,
-        Piece::GaussMarkov => lines && own[1].exp() < WIDE_LINE * data.dt,
-        Piece::Flicker | Piece::RandomWalk | Piece::Ramp => false,
+        Piece::White => true,
+        Piece::Oscillation | Piece::GaussMarkov => lines && stands_for_a_limit(data, piece, own),
+        _ => stands_for_a_limit(data, piece, own),
     };
     let without = |lines: bool| {
         let of = |(form, logs): (Form, Vec<f64>), at: usize| {
@@ -236,7 +266,7 @@ fn band_limits(data: &Ordinates, base: &Fit, orders: RangeInclusive<u8>) -> Vec<
     bare.dedup();
     let level = whittle::level(data);
     let shapes: Vec<(u8, Vec<f64>)> =
-        orders.flat_map(|order| shapes(order).into_iter().map(move |own| (order, own))).collect();
+        orders.clone().flat_map(|order| shapes(order).into_iter().map(move |own| (order, own))).collect();
     let tried = bare.iter().flat_map(|bare| shapes.iter().map(move |shape| (bare, shape)));
     let of = |((form, logs), (order, shape)): (&Bare, &OfOrder)| {
         let own: Vec<f64> = std::iter::once(level).chain(shape.iter().copied()).collect();
@@ -247,9 +277,17 @@ fn band_limits(data: &Ordinates, base: &Fit, orders: RangeInclusive<u8>) -> Vec<
     let tried: Vec<_> = tried.collect();
     let mut found: Vec<(f64, u8, Start)> = tried.into_par_iter().filter_map(of).collect();
     found.sort_by(|a, b| a.1.cmp(&b.1).then(b.0.total_cmp(&a.0)));
-    // the best of each order, which is also the one that is searched
-    let best = found.chunk_by(|a, b| a.1 == b.1).filter_map(|of_order| of_order.first());
-    best.map(|(_, _, start)| start.clone()).collect()
+    // the best of each order, and one that is nearly white
+    let best =
+        found.chunk_by(|a, b| a.1 == b.1).filter_map(|of_order| of_order.first()).map(|(_, _, start)| start.clone());
+    let nearly_white = bare.iter().flat_map(|(form, logs)| {
+        orders.clone().map(move |order| {
+            let own: Vec<f64> =
+                std::iter::once(level).chain((0..order).map(|_| 0.3)).chain((0..order).map(|_| -0.3)).collect();
+            form.with(logs, Piece::BandLimit(order), &own)
+        })
+    });
+    best.chain(nearly_white).collect()
 }
 
 /// Logarithms of the area ratios of low-passes of this order from a hundredth of the sample rate up: Butterworth's by the bilinear transform, with

@@ -47,6 +47,15 @@ impl Precision {
 
 /// Of every logarithm of a fit.
 pub(super) fn precisions(data: &Ordinates, fit: &Fit) -> Vec<Precision> {
+    searched(data, fit, true)
+}
+
+/// The same, but for what is no drift from the observed information alone: enough to say what the log tells of its drift.
+pub(super) fn drift_precisions(data: &Ordinates, fit: &Fit) -> Vec<Precision> {
+    searched(data, fit, false)
+}
+
+fn searched(data: &Ordinates, fit: &Fit, wideband: bool) -> Vec<Precision> {
     let expected = deviations(whittle::expected_information(data, &fit.form, &fit.logs));
     let observed = deviations(whittle::observed_information(data, fit));
     let bounds = whittle::bounds(data, &fit.form, &fit.logs);
@@ -69,7 +78,7 @@ pub(super) fn precisions(data: &Ordinates, fit: &Fit) -> Vec<Precision> {
                 (false, false) => ROUGH[1],
                 (false, true) => ROUGH_BESIDE_A_FILTER,
             };
-            let limits = if sigma < rough {
+            let limits = if sigma < rough || !(drift || wideband) {
                 [-1.0, 1.0].map(|side| Ok(fit.logs[i] + side * NORMAL_95 * sigma))
             } else {
                 let step = first_step(sigma, bound, rough);

@@ -39,7 +39,7 @@ use exact::{Exact, Refined};
 use form::{Form, Piece};
 use growth::score;
 pub(super) use growth::{HIGHEST_ORDER, LONGEST_AVERAGE};
-use interval::{Precision, precisions};
+use interval::{Precision, drift_precisions, precisions};
 use names::{name_of, parameter_name, term_name, unit_of};
 use ordinates::Ordinates;
 use whittle::Fit;
@@ -226,25 +226,34 @@ fn choose(
     };
     match choice {
         ModelChoice::Auto => {
-            let (fits, parts) = rayon::join(|| fits(&data, choice), parts);
+            let (mut fits, parts) = rayon::join(|| fits(&data, choice), parts);
             let held_out = held_out(parts, &fits);
             let chosen = choice_of(&data, &fits, &held_out);
+            whole(&data, &mut fits, chosen);
             let refined = refined(&fits, chosen);
             Candidates { data, fits, held_out, chosen, refined }
         }
         // what is held out chooses nothing
         ModelChoice::Terms { .. } => {
-            let fits = fits(&data, choice);
+            let mut fits = fits(&data, choice);
+            whole(&data, &mut fits, 0);
             let (refined, held_out) = rayon::join(|| refined(&fits, 0), || held_out(parts(), &fits));
             Candidates { data, fits, held_out, chosen: 0, refined }
         }
     }
 }
 
-/// Fits of the models that come into question, best score first, with what is known of their parameters.
+/// All that is known of the parameters of one of the fits.
+fn whole(data: &Ordinates, fits: &mut [(Fit, Vec<Precision>)], chosen: usize) {
+    if let Some((fit, known)) = fits.get_mut(chosen) {
+        *known = precisions(data, fit);
+    }
+}
+
+/// Fits of the models that come into question, best score first, with what is known of their drift.
 fn fits(data: &Ordinates, choice: &ModelChoice) -> Vec<(Fit, Vec<Precision>)> {
     let known = |fit: Fit| {
-        let known = precisions(data, &fit);
+        let known = drift_precisions(data, &fit);
         (fit, known)
     };
     match choice {
@@ -390,7 +399,7 @@ fn reduced(data: &Ordinates, best: &(Fit, Vec<Precision>)) -> Option<(Fit, Vec<P
     while let Some(last) = unknown(data, &found.0, &found.1).pop() {
         let (form, logs) = found.0.form.without(&found.0.logs, found.0.form.roles()[last].0);
         let fit = whittle::climb_all(data, &form, &logs)?;
-        let known = precisions(data, &fit);
+        let known = drift_precisions(data, &fit);
         found = (fit, known);
     }
     Some(found)

@@ -265,6 +265,15 @@ fn what_the_parameters_leave_open_is_decided_by_a_stated_rule() {
     close(p0(&given), 0.7, 1e-12);
     close(given.design.axes[0].model.x0[0], -0.7 * DEGREE, 1e-14);
     assert!(given.reports[0].warnings[0].contains("the size of the given bias"));
+    // a bias near zero is no smaller than it is known, drift counts where that is more
+    for (interval, expected, rule) in
+        [([-0.39, 0.41], 0.4, "as far as its interval reaches, 0.4000 deg/s"), ([-0.04, 0.06], 0.09, "three times")]
+    {
+        params.axes[0].bias = Some(Measured { interval: Some(interval), ..measured(0.01, "deg/s") });
+        let near_zero = tuned(&params);
+        close(p0(&near_zero), expected, 1e-12);
+        assert!(near_zero.reports[0].warnings[0].contains(rule), "{:?}", near_zero.reports[0].warnings);
+    }
     let nothing = tuned(&sensor(100.0, vec![white(0.01)], None));
     close(p0(&nothing), 1.0, 1e-12);
     assert!(nothing.reports[0].warnings.iter().any(|w| w.contains("averages for ever")));

@@ -525,3 +525,32 @@ impl SamplePath for Path {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Against central differences of ln|B/A|² and of ln b₀²: steps of 1e-4, errors of their square.
+    #[test]
+    fn slopes_are_those_of_the_spectrum() {
+        let ratios = [3.0, 0.4, 12.0, 0.3, 2.0, 0.7];
+        let turns = [0.0, 0.01, 0.13, 0.31, 0.5];
+        let [sin, cos]: [Vec<f64>; 2] =
+            [f64::sin, f64::cos].map(|of| turns.iter().map(|f| of(std::f64::consts::PI * f)).collect());
+        for (i, (slope, level)) in Filter::slopes(&ratios, &sin, &cos).into_iter().enumerate() {
+            let moved = |by: f64| {
+                let mut own = ratios;
+                own[i] *= f64::exp(by);
+                Filter::from_area_ratios(&own).unwrap()
+            };
+            let (above, below) = (moved(1e-4), moved(-1e-4));
+            let of = |value: &dyn Fn(&Filter) -> f64| (value(&above).ln() - value(&below).ln()) / 2e-4;
+            for (f, found) in turns.iter().zip(&slope) {
+                let expected = of(&|filter| filter.power_gain(*f));
+                assert!((found - expected).abs() < 1e-6, "{i} at {f}: {found}, not {expected}");
+            }
+            let expected = of(&|filter| filter.innovation());
+            assert!((level - expected).abs() < 1e-6, "{i}: {level}, not {expected}");
+        }
+    }
+}

@@ -119,12 +119,7 @@ fn time(term: &TermEntry) -> f64 {
 
 /// All that counts as white noise, at low frequencies, SI, with the unit of the first.
 fn white(file: &AxisParams, dt: f64) -> Option<(f64, Unit)> {
-    let unit = file.terms.iter().find_map(|term| match term {
-        TermEntry::White { density }
-        | TermEntry::MovingAverage { density, .. }
-        | TermEntry::BandLimit { density, .. } => Some(density.unit.clone()),
-        _ => None,
-    })?;
+    let unit = file.terms.iter().find_map(TermEntry::wideband_density)?.unit.clone();
     let square: f64 = file.noise().terms.iter().filter(|t| counts_as_white(t, dt)).map(|t| t.psd(0.0, dt)).sum();
     Some((square.sqrt(), unit))
 }

@@ -100,6 +100,11 @@ impl Kalman {
         }
     }
 
+    /// H x: the measurement that is expected where the states are now.
+    pub fn expected(&self, index: usize) -> f64 {
+        self.h_columns.column(index).dot(&self.x)
+    }
+
     /// From here on the matrices of `model`, which has the same states; x and P stay.
     pub fn change(&mut self, model: &LinearModel) {
         let (x, p) = (std::mem::take(&mut self.x), std::mem::take(&mut self.p));

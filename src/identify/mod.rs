@@ -203,7 +203,7 @@ pub fn parse_model(text: &str) -> Result<ModelChoice, IdentifyError> {
     for part in text.split('+').map(str::trim) {
         let samples = (2..=likelihood::LONGEST_AVERAGE).find(|samples| part == format!("ma{samples}"));
         average = average.or(samples);
-        let poles = (1..=likelihood::HIGHEST_ORDER).find(|poles| part == format!("bl{poles}"));
+        let poles = (1..=likelihood::MOST_POLES).find(|poles| part == format!("bl{poles}"));
         order = order.or(poles);
         let name = if samples.is_some() {
             "ma"

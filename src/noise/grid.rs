@@ -39,9 +39,7 @@ impl Grid {
         let weights = all.iter().map(weight).collect();
         Grid { weights, every, ..Grid::new(all, dt) }
     }
-}
 
-impl Grid {
     /// Of a band limit made of area ratios: ∂ ln S by the logarithm of each, at every frequency, and ∂ ln b₀² by it; `None` where frequencies add.
     pub(crate) fn shape_slopes(&self, ratios: &[f64]) -> Option<Vec<(Vec<f64>, f64)>> {
         self.weights.is_empty().then(|| Filter::slopes(ratios, &self.sin, &self.cos))

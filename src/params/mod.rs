@@ -145,6 +145,16 @@ impl AxisParams {
 }
 
 impl TermEntry {
+    /// Of what is white at low frequencies: white noise, a moving average, a band limit.
+    pub fn wideband_density(&self) -> Option<&Measured> {
+        match self {
+            TermEntry::White { density }
+            | TermEntry::MovingAverage { density, .. }
+            | TermEntry::BandLimit { density, .. } => Some(density),
+            _ => None,
+        }
+    }
+
     /// The term's key in the document and its coefficients by name.
     fn parameters(&mut self) -> (&'static str, Vec<(&'static str, &mut Measured)>) {
         match self {

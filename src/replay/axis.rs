@@ -236,12 +236,10 @@ impl AxisReplay {
     /// The noise as the samples so far have it, where it is followed.
     fn follow(&mut self, sensor: f64) {
         let (Some(following), Running::Joseph(kalman)) = (&mut self.following, &mut self.filter) else { return };
-        let channel = &mut self.channels[0];
-        let used = channel.last.is_some_and(|update| update.accepted);
-        let value = if used { sensor } else { channel.h.dot(&kalman.x) };
+        let used = self.channels[0].last.is_some_and(|update| update.accepted);
+        let value = if used { sensor } else { kalman.expected(0) };
         if let Some(model) = following.take(value) {
             kalman.change(&model);
-            channel.h = model.h.row(0).transpose();
             // the answer to a shift of x0 is that of the design
             self.start.shifted = None;
         }

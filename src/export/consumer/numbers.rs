@@ -200,13 +200,7 @@ fn chain(term: &Term, dt: f64) -> Vec<GaussMarkov> {
 /// Only where white noise is one term with an interval; beside it at most a floor, less than a hundredth, as `identify` gives to a band limit: it
 /// moves the density of both by 5e-5.
 fn white_interval(axis: &AxisParams) -> Option<[f64; 2]> {
-    let wideband = axis.terms.iter().filter_map(|term| match term {
-        TermEntry::White { density }
-        | TermEntry::MovingAverage { density, .. }
-        | TermEntry::BandLimit { density, .. } => Some(density),
-        _ => None,
-    });
-    let wideband: Vec<&Measured> = wideband.collect();
+    let wideband: Vec<&Measured> = axis.terms.iter().filter_map(TermEntry::wideband_density).collect();
     let only = *wideband.iter().max_by(|a, b| a.si().total_cmp(&b.si()))?;
     let floors = wideband.iter().filter(|other| other.si() < 0.01 * only.si()).count();
     only.interval_si().filter(|_| floors + 1 == wideband.len())

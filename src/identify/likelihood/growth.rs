@@ -21,7 +21,7 @@ const MOST_OSCILLATIONS: usize = 8;
 /// Longest moving average that is tried.
 pub(in crate::identify) const LONGEST_AVERAGE: u32 = 16;
 /// Most poles, and zeros, of a band limit that are tried.
-pub(in crate::identify) const HIGHEST_ORDER: u8 = 6;
+pub(in crate::identify) const MOST_POLES: u8 = 6;
 /// And at first; more by one at a time.
 const FIRST_ORDERS: u8 = 4;
 /// A band limit that remembers longer than so many samples is drift, or a line.
@@ -354,7 +354,7 @@ fn other_orders(form: &Form, logs: &[f64], order: u8, own: &[f64]) -> Vec<Start>
         form.with(logs, Piece::BandLimit(order), &own)
     };
     let mut moves = Vec::new();
-    if order < HIGHEST_ORDER {
+    if order < MOST_POLES {
         for (pole, zero) in [(0.3, -0.3), (-0.3, 0.3), (0.3, 0.3)] {
             moves.push(with(order + 1, [a, &[pole]].concat(), [b, &[zero]].concat()));
         }

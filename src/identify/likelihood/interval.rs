@@ -47,15 +47,11 @@ impl Precision {
 
 /// Of every logarithm of a fit.
 pub(super) fn precisions(data: &Ordinates, fit: &Fit) -> Vec<Precision> {
-    searched(data, fit, true)
+    completed(data, fit, &drift_precisions(data, fit))
 }
 
 /// The same, but for what is no drift from the observed information alone: enough to say what the log tells of its drift.
 pub(super) fn drift_precisions(data: &Ordinates, fit: &Fit) -> Vec<Precision> {
-    searched(data, fit, false)
-}
-
-fn searched(data: &Ordinates, fit: &Fit, wideband: bool) -> Vec<Precision> {
     let expected = deviations(whittle::expected_information(data, &fit.form, &fit.logs));
     let observed = deviations(whittle::observed_information(data, fit));
     let bounds = whittle::bounds(data, &fit.form, &fit.logs);
@@ -73,21 +69,11 @@ fn searched(data: &Ordinates, fit: &Fit, wideband: bool) -> Vec<Precision> {
                 // a shape at its bounds makes the observed one singular
                 sigma = bound;
             }
-            let rough = match (drift, limited) {
-                (true, _) => ROUGH[0],
-                (false, false) => ROUGH[1],
-                (false, true) => ROUGH_BESIDE_A_FILTER,
-            };
-            let limits = if sigma < rough || !(drift || wideband) {
-                [-1.0, 1.0].map(|side| Ok(fit.logs[i] + side * NORMAL_95 * sigma))
-            } else {
-                let step = first_step(sigma, bound, rough);
-                let sides = [(-1.0, bounds[i].0), (1.0, bounds[i].1)];
-                sides.map(|(side, end)| profile(data, fit, i, [side * step, end], NORMAL_95))
-            };
-            let told = limits.iter().all(|limit| limit.map_or_else(|root| root >= NORMAL_90, |_| true));
-            let [lower, upper] = limits.map(Result::ok);
-            Precision { sigma, bound, lower, upper, told }
+            if drift && sigma >= ROUGH[0] {
+                return profiled(data, fit, i, bounds[i], [sigma, bound, ROUGH[0]]);
+            }
+            let [lower, upper] = [-1.0, 1.0].map(|side| Some(fit.logs[i] + side * NORMAL_95 * sigma));
+            Precision { sigma, bound, lower, upper, told: true }
         })
         .collect();
     for std_dev in endless(&fit.form, &known) {
@@ -95,6 +81,39 @@ fn searched(data: &Ordinates, fit: &Fit, wideband: bool) -> Vec<Precision> {
         known[std_dev].lower = profile(data, fit, std_dev, [-step, bounds[std_dev].0], NORMAL_99).ok();
     }
     keep_open(&fit.form, known)
+}
+
+/// All that is known, from what [`drift_precisions`] gave.
+pub(super) fn completed(data: &Ordinates, fit: &Fit, known: &[Precision]) -> Vec<Precision> {
+    let bounds = whittle::bounds(data, &fit.form, &fit.logs);
+    let roles = fit.form.roles();
+    let rough = if fit.form.has(Kind::BandLimit) { ROUGH_BESIDE_A_FILTER } else { ROUGH[1] };
+    let of = |i: usize| {
+        let (piece, role) = roles[i];
+        let drift = fit.form.pieces()[piece].kind().is_drift();
+        let Precision { sigma, bound, .. } = known[i];
+        if drift || role == Role::Shape || sigma < rough {
+            known[i]
+        } else {
+            profiled(data, fit, i, bounds[i], [sigma, bound, rough])
+        }
+    };
+    keep_open(&fit.form, (0..known.len()).into_par_iter().map(of).collect())
+}
+
+/// From the profile likelihood; `rough`: σ from which on it is asked for.
+fn profiled(
+    data: &Ordinates,
+    fit: &Fit,
+    i: usize,
+    (low, high): (f64, f64),
+    [sigma, bound, rough]: [f64; 3],
+) -> Precision {
+    let step = first_step(sigma, bound, rough);
+    let limits = [(-1.0, low), (1.0, high)].map(|(side, end)| profile(data, fit, i, [side * step, end], NORMAL_95));
+    let told = limits.iter().all(|limit| limit.map_or_else(|root| root >= NORMAL_90, |_| true));
+    let [lower, upper] = limits.map(Result::ok);
+    Precision { sigma, bound, lower, upper, told }
 }
 
 /// Numbers of σ of the Gauss-Markov processes whose correlation time has a lower limit and no upper one. Their lower limit is that of 99 %, because that of 95 % is right in 90 % of

@@ -38,8 +38,8 @@ use crate::units::Unit;
 use exact::{Exact, Refined};
 use form::{Form, Piece};
 use growth::score;
-pub(super) use growth::{HIGHEST_ORDER, LONGEST_AVERAGE};
-use interval::{Precision, drift_precisions, precisions};
+pub(super) use growth::{LONGEST_AVERAGE, MOST_POLES};
+use interval::{Precision, completed, drift_precisions};
 use names::{name_of, parameter_name, term_name, unit_of};
 use ordinates::Ordinates;
 use whittle::Fit;
@@ -123,9 +123,11 @@ impl Whole<'_> {
         let Candidates { data, fits, held_out, chosen, refined } = found;
         let used = data.samples * data.windows as usize;
         let (Some((on_cosines, _)), Some((fitted, refined))) = (fits.get(chosen), refined) else {
-            let line = matches!(choice, ModelChoice::Terms { kinds, .. } if kinds.contains(&Kind::Oscillation));
-            return Err(failed(if line {
+            let asked = |kind: Kind| matches!(choice, ModelChoice::Terms { kinds, .. } if kinds.contains(&kind));
+            return Err(failed(if asked(Kind::Oscillation) {
                 "no line stands out of the spectrum: leave osc out of --model".into()
+            } else if asked(Kind::BandLimit) {
+                "every filter of this order would be a line (osc) or drift (gm, flicker, rrw): add that to --model, take another order, or auto".into()
             } else {
                 format!("{samples} samples say nothing about any noise term; use a longer log")
             }));
@@ -246,7 +248,7 @@ fn choose(
 /// All that is known of the parameters of one of the fits.
 fn whole(data: &Ordinates, fits: &mut [(Fit, Vec<Precision>)], chosen: usize) {
     if let Some((fit, known)) = fits.get_mut(chosen) {
-        *known = precisions(data, fit);
+        *known = completed(data, fit, known);
     }
 }
 
@@ -367,7 +369,7 @@ fn forms(kinds: &[Kind], average: Option<u32>, order: Option<u8>) -> Vec<Form> {
         Form::new(kinds.iter().filter(|kind| !(limited && **kind == Kind::White)).map(piece).collect())
     };
     let averages = average.map_or(2..=LONGEST_AVERAGE, |samples| samples..=samples);
-    let orders = order.map_or(1..=HIGHEST_ORDER, |order| order..=order);
+    let orders = order.map_or(1..=MOST_POLES, |order| order..=order);
     let mut all: Vec<Form> =
         averages.flat_map(|samples| orders.clone().map(move |order| with(samples, order))).collect();
     all.sort();

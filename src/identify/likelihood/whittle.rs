@@ -226,6 +226,9 @@ fn information_of(data: &Ordinates, Spectrum { total, derivatives }: &Spectrum) 
 
 /// Σ a b in four sums, which the processor takes side by side; 0 with a held piece, which has none.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
+    if a.len() != b.len() {
+        return 0.0;
+    }
     let (fours, rest) = a.as_chunks::<4>();
     let (others, end) = b.as_chunks::<4>();
     let mut sums = [0.0; 4];
@@ -234,11 +237,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
             *sum += a * b;
         }
     }
-    if a.len() == b.len() {
-        sums.iter().sum::<f64>() + rest.iter().zip(end).map(|(a, b)| a * b).sum::<f64>()
-    } else {
-        0.0
-    }
+    sums.iter().sum::<f64>() + rest.iter().zip(end).map(|(a, b)| a * b).sum::<f64>()
 }
 
 /// Second derivatives of −ln L by the logarithms.
@@ -357,10 +356,8 @@ pub(super) fn climb(data: &Ordinates, form: &Form, start: &[f64], free: &[usize]
         scoring(data, form, &mut at, &held, free, &bounds);
     }
     let mut best = objective(data, form, &at, &held, None);
-    for _ in 0..8 {
-        if free.is_empty() || scored {
-            break;
-        }
+    let rounds = if scored || free.is_empty() { 0 } else { 8 };
+    for _ in 0..rounds {
         let information = information(data, form, &at, &held);
         let scale: Vec<f64> = free.iter().map(|i| 1.0 / information[(*i, *i)].sqrt().clamp(1.0, 1e8)).collect();
         let place = |x: &[f64]| {

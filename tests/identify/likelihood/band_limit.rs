@@ -3,6 +3,8 @@
 use super::*;
 use kfdesign::noise::{Filter, Kind};
 
+use crate::support::Bench;
+
 /// Butterworth low-passes of order 1 to 3 by `scipy.signal.butter(order, 2 corner)`, and what is no Butterworth filter: sinc³ of four samples.
 fn filters() -> Vec<(&'static str, Filter)> {
     let of = |b: &[f64], a: &[f64]| Filter::new(b, a).unwrap();
@@ -124,6 +126,27 @@ fn steep_filters_grow() {
     assert!(order.is_some_and(|order| order > 4), "{}", model(&found));
     let largest = largest_autocorrelation(&whitened(&found, second));
     assert!(largest < 4.6 / (second.len() as f64).sqrt(), "{largest}");
+}
+
+/// A filter asked for by name takes no drift of 500 samples (its density would be σ √(2 Tc), 160 times that of the white noise) and no line of 50 samples, whose peak is 450 times
+/// the noise: that is refused.
+#[test]
+fn drift_and_lines_are_no_filter() {
+    let bl = |order: &str| parse_model(order).unwrap();
+    let drift = log(&[white(0.01), gauss_markov(0.5, 5.0)], 60_000, 0.01, 96, 0);
+    let found = identify(&drift, 0.01, &bl("bl1"));
+    let density = found.model.terms.iter().find_map(|term| match term {
+        Term::BandLimit { density, .. } => Some(*density),
+        _ => None,
+    });
+    assert!(density.is_some_and(|density| (0.005..0.02).contains(&density)), "{density:?}");
+    let line = Term::Oscillation { std_dev: 0.3, frequency_hz: 20.0, correlation_time: 0.5 };
+    let bench = Bench::new();
+    let rows = log(&[white(0.01), line], 30_000, 0.01, 97, 0).into_iter().map(|v| format!("{v}\n"));
+    bench.file("log.csv", std::iter::once("gyro_x (rad/s)\n".to_string()).chain(rows).collect::<String>());
+    let refused = bench.run("identify log.csv --rate 100 --model bl2");
+    assert_eq!(refused.status, 2, "{}", refused.stdout);
+    assert!(refused.stderr.contains("would be a line (osc) or drift (gm, flicker, rrw)"), "{}", refused.stderr);
 }
 
 /// Two narrow lines and a wide one, twelve logs of half a minute, are no filter with a resonance: what takes a filter first, for it explains more than one line does,

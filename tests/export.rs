@@ -418,8 +418,8 @@ fn the_story_from_a_ulog_to_ekf2_is_true() {
         // a fit: another machine rounds otherwise
         assert!((number(found) / number(shown) - 1.0).abs() < 1e-4, "{found}: {shown}");
     }
-    // 5.87e-5 rad/s/sqrt(Hz) over sqrt(10 ms)
-    assert!((number_of(&written, "EKF2_GYR_NOISE") / 5.87e-4 - 1.0).abs() < 1e-3);
+    // 6.82e-5 rad/s/sqrt(Hz) over sqrt(10 ms)
+    assert!((number_of(&written, "EKF2_GYR_NOISE") / 6.82e-4 - 1.0).abs() < 1e-3);
 }
 
 fn number_of(params: &str, name: &str) -> f64 {

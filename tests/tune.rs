@@ -1,6 +1,7 @@
 //! The tuned design against printed vectors and an independent implementation; its verification by Monte Carlo.
 
 mod lines;
+mod low_pass;
 mod objectives;
 mod under_truth;
 

@@ -31,6 +31,11 @@ impl Measured {
     pub fn si(&self) -> f64 {
         self.unit.to_si(self.value)
     }
+    /// Less than a hundredth of a density, as the white noise that `identify` sets beside a band limit so that a filter exists: it moves the sum of
+    /// both by at most 5e-5.
+    pub fn is_floor_of(&self, whole_si: f64) -> bool {
+        self.si() < 0.01 * whole_si
+    }
     /// The interval in SI.
     pub fn interval_si(&self) -> Option<[f64; 2]> {
         self.interval.map(|i| i.map(|v| self.unit.to_si(v)))

@@ -91,7 +91,8 @@ pub struct AxisReport {
     pub settling_time_s: f64,
     /// Time after which the predicted sigma of the whole drift stays within 5 % of its final value; absent when there is none.
     pub drift_settling_time_s: Option<f64>,
-    /// Frequency at which the estimate follows the drift with half the power it has at rest; absent when the filter follows no drift.
+    /// Frequency at which the estimate follows the drift with half the power it has at rest; absent when the filter follows no drift (no error budget,
+    /// then), or drift at all frequencies up to half the sample rate.
     pub bandwidth_hz: Option<f64>,
     /// Causes of the final variance of the drift estimate; the shares sum to one. Empty when that variance tends to zero.
     pub error_budget: Vec<Share>,

@@ -57,21 +57,29 @@ fn row(name: &str, value: &Measured, also: String) -> Vec<String> {
 /// One row for each parameter, in the order of the document.
 pub(in crate::cli) fn term_rows(terms: &[TermEntry], quantity: Quantity, sample_rate_hz: f64) -> Vec<Vec<String>> {
     let mut rows = Vec::new();
-    let white =
-        terms.iter().find_map(|term| if let TermEntry::White { density } = term { Some(density) } else { None });
+    let wideband: Vec<&Measured> = terms.iter().filter_map(TermEntry::wideband_density).collect();
+    let total = wideband.iter().map(|density| density.si()).fold(0.0, f64::hypot);
+    // the last of them is told as a random walk: all together
+    let and_all = |density: &Measured, own: Option<String>| {
+        let last = wideband.last().is_some_and(|last| std::ptr::eq(*last, density));
+        let all = if last { random_walk_name(total, quantity) } else { None };
+        own.into_iter().chain(all).collect::<Vec<_>>().join("; ")
+    };
     for term in terms {
         match term {
             TermEntry::Quantization { coefficient } => rows.push(row("quantization Q", coefficient, String::new())),
-            TermEntry::White { density } => rows.push(row("white N", density, random_walk_name(density, quantity))),
+            TermEntry::White { density } => {
+                let floor = density.is_floor_of(total).then(|| "a floor that a filter needs".to_string());
+                rows.push(row("white N", density, and_all(density, floor)));
+            }
             TermEntry::MovingAverage { density, samples } => {
                 let unit = &density.unit;
-                let total = density.si().hypot(white.map_or(0.0, Measured::si));
                 let also = format!("over {samples} samples; with white {} {unit}", digits(unit.from_si(total)));
-                rows.push(row("moving average N", density, also));
+                rows.push(row("moving average N", density, and_all(density, Some(also))));
             }
             TermEntry::BandLimit { density, filter } => {
                 let corner = filter.half_power().map(|share| format!("-3 dB at {} Hz", digits(share * sample_rate_hz)));
-                rows.push(row("band limit N", density, corner.unwrap_or_default()));
+                rows.push(row("band limit N", density, and_all(density, corner)));
             }
             TermEntry::Oscillation { std_dev, frequency, correlation_time } => {
                 rows.push(row("oscillation sigma", std_dev, String::new()));
@@ -100,12 +108,12 @@ fn in_unit(si: f64, unit: &str) -> Option<String> {
 }
 
 /// The integral of white noise as datasheets call it.
-fn random_walk_name(density: &Measured, quantity: Quantity) -> String {
+fn random_walk_name(density_si: f64, quantity: Quantity) -> Option<String> {
     let (name, unit) = match quantity {
         Quantity::AngularRate => ("angle random walk", "deg/sqrt(h)"),
         Quantity::SpecificForce => ("velocity random walk", "m/s/sqrt(h)"),
     };
-    in_unit(density.si(), unit).map_or_else(String::new, |value| format!("{name} {value}"))
+    in_unit(density_si, unit).map(|value| format!("{name} {value}"))
 }
 
 fn floor_name(coefficient: &Measured, quantity: Quantity) -> String {

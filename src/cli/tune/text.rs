@@ -233,7 +233,8 @@ pub(super) fn facts(group: &Group<'_>, quantity: Quantity) -> Vec<(&'static str,
     let output = model.outputs.iter().find(|output| output.name != DRIFT);
     let bandwidth = match (report.bandwidth_hz, output) {
         (Some(f), None) => Some(format!("{} Hz (half power of the drift estimate)", digits(f))),
-        (None, None) => Some("0: the filter follows no drift".into()),
+        (None, None) if report.error_budget.is_empty() => Some("0: the filter follows no drift".into()),
+        (None, None) => Some("up to half the sample rate: the drift estimate follows each sample".into()),
         (Some(f), Some(output)) => {
             let above = if model.inputs.is_empty() {
                 String::new()

@@ -197,12 +197,11 @@ fn chain(term: &Term, dt: f64) -> Vec<GaussMarkov> {
         .collect()
 }
 
-/// Only where white noise is one term with an interval; beside it at most a floor, less than a hundredth, as `identify` gives to a band limit: it
-/// moves the density of both by 5e-5.
+/// Only where white noise is one term with an interval; beside it at most a floor.
 fn white_interval(axis: &AxisParams) -> Option<[f64; 2]> {
     let wideband: Vec<&Measured> = axis.terms.iter().filter_map(TermEntry::wideband_density).collect();
     let only = *wideband.iter().max_by(|a, b| a.si().total_cmp(&b.si()))?;
-    let floors = wideband.iter().filter(|other| other.si() < 0.01 * only.si()).count();
+    let floors = wideband.iter().filter(|other| other.is_floor_of(only.si())).count();
     only.interval_si().filter(|_| floors + 1 == wideband.len())
 }
 

@@ -58,6 +58,18 @@ pub enum SensorArg {
 }
 
 impl LogFlags {
+    /// The same for what reads sample by sample, and knows rates alone.
+    pub fn rates(&self) -> anyhow::Result<LogOptions> {
+        let flag = match self.input {
+            InputArg::Rate => return self.options(),
+            InputArg::Increments => "increments",
+            InputArg::Angle => "angle",
+        };
+        anyhow::bail!(
+            "--input {flag}: a filter runs on rates, sample by sample; write the log as rates first (increments, or differences of angles, over the sample period)"
+        )
+    }
+
     /// What was typed, checked.
     pub fn options(&self) -> anyhow::Result<LogOptions> {
         Ok(LogOptions {

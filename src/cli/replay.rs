@@ -113,7 +113,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     }
     let extra = aid_columns(&args.aid, &design).with_context(|| args.filter.display().to_string())?;
     let extra_columns = extra.len();
-    let mut reader = LogReader::open(&args.log, &LogOptions { extra, ..args.reading.options()? })?;
+    let mut reader = LogReader::open(&args.log, &LogOptions { extra, ..args.reading.rates()? })?;
     let name = args.log.display().to_string();
     let mut check = reader.check().clone();
     // a plant's log is one that moves

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::spectrum::{Band, Ratios};
 use super::{CompareError, Log, LogAxis, other_rate, paired};
-use crate::noise::{Kind, NoiseModel};
+use crate::noise::{Kind, NoiseModel, Term};
 use crate::numerics::distribution::{CHI_SQUARE_1_MEDIAN, NORMAL_95, chi_square_quantile};
 use crate::numerics::reduce::mean;
 use crate::params::{AxisParams, Inflated, Params, Source, TermEntry};
@@ -154,7 +154,11 @@ fn inflation_of(
         pieces => (pieces.to_vec(), 0.5),
     };
     let (tapered, dofs): (Vec<Vec<f64>>, Vec<f64>) = parts.iter().map(|part| tapered(part, share)).unzip();
-    let ratios = Ratios { dof: mean(&dofs), ..Ratios::of_segments(&tapered, dt, &model, from_hz) };
+    let mut ratios = Ratios { dof: mean(&dofs), ..Ratios::of_segments(&tapered, dt, &model, from_hz) };
+    let top_hz = pass_band_hz(&model, rate_hz).filter(|top| *top > from_hz && *top < 0.5 * rate_hz);
+    if let Some(top) = top_hz {
+        ratios.values.truncate(((top / ratios.step_hz) as usize + 1).saturating_sub(ratios.first));
+    }
     let samples = parts.iter().map(|part| part.len()).sum::<usize>();
     let count = ratios.values.len();
     if count < FEWEST {
@@ -178,6 +182,12 @@ fn inflation_of(
             "{} % of the power is in lines or a part of the band: as white noise it is overstated elsewhere; without, the factor is {}",
             digits(100.0 * (1.0 - (robust_factor / factor).powi(2))),
             digits(robust_factor)
+        ));
+    }
+    if let Some(top) = top_hz {
+        notes.push(format!(
+            "what is above {} Hz, where the band limit lets through less than half, is left out: the converter's own noise has a part there",
+            digits(top)
         ));
     }
     notes.extend(not_flat(&bands, &z, bound));
@@ -209,6 +219,12 @@ fn inflation_of(
         lines,
         notes,
     })
+}
+
+/// Up to where the band limits of the model let half of the power through, Hz.
+fn pass_band_hz(model: &NoiseModel, rate_hz: f64) -> Option<f64> {
+    let share = |term: &Term| if let Term::BandLimit { filter, .. } = term { filter.half_power() } else { None };
+    model.terms.iter().filter_map(share).min_by(f64::total_cmp).map(|share| share * rate_hz)
 }
 
 /// Two or more segments of one length between gaps and unusable samples; none where one stretch is most of the log, or no other piece is long enough.

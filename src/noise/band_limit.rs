@@ -163,6 +163,23 @@ impl Filter {
         Some(kappa.map(|k| (1.0 + k) / (1.0 - k)).collect())
     }
 
+    /// As it is where all zeros are inside the unit circle, else with all of them moved towards the origin by this factor.
+    pub(crate) fn zeros_within(self, factor: f64) -> Filter {
+        if self.area_ratios().is_some_and(|ratios| ratios.iter().all(|g| *g > 0.0 && g.is_finite())) {
+            return self;
+        }
+        let moved: Vec<f64> = self
+            .numerator()
+            .iter()
+            .scan(1.0, |by, b| {
+                let own = *by * b;
+                *by *= factor;
+                Some(own)
+            })
+            .collect();
+        Filter::new(&moved, self.denominator()).unwrap_or(self)
+    }
+
     /// With these poles and zeros, each standing for itself and, where it is not real, its conjugate.
     pub(crate) fn of_roots(zeros: &[Complex<f64>], poles: &[Complex<f64>]) -> Option<Filter> {
         Filter::new(&polynomial(zeros), &polynomial(poles)).ok()

@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use kfdesign::compare::inflation::{AxisInflation, inflated, inflation};
 use kfdesign::compare::{CompareError, Log};
-use kfdesign::noise::Term;
+use kfdesign::noise::{Filter, Term};
 use kfdesign::params::{Params, TermEntry};
 use kfdesign::units::digits;
 
@@ -124,6 +124,18 @@ fn the_inflated_parameters() {
     assert!(matches!(inflation(&bench, &flight, 5.0), Err(CompareError::Option { flag: "--from", .. })));
     let few = inflation(&bench, &log(&loud, 400, 0), 4.0).unwrap_err().to_string();
     assert!(few.contains("80 spectral coefficients above 4.000 Hz") || few.contains("79 spectral"), "{few}");
+}
+
+/// Noise three times as loud before a low-pass, the converter's own behind it as it was: the factor is that of what passes. Between half a hertz and half power at
+/// one there are 2000 coefficients: 1.6 %, five of it (6e-7); where nothing passes the log is as loud as the bench.
+#[test]
+fn behind_a_low_pass_what_passes_counts() {
+    let filter = Filter::new(&[1.0, 2.0, 1.0], &[1.0, -1.142_980_502_539_901_1, 0.412_801_598_096_188_77]).unwrap();
+    let of = |density: f64| vec![Term::White { density: 0.002 }, Term::BandLimit { density, filter }];
+    let found = inflation(&params(&of(0.05)), &log(&params(&of(0.15)), 20_000, 5), FROM).unwrap();
+    let axis = &found.axes[0];
+    assert!((axis.factor / 3.0 - 1.0).abs() < 5.0 * 0.016, "{}", axis.factor);
+    assert!(axis.notes.iter().any(|note| note.contains("lets through less than half")), "{:?}", axis.notes);
 }
 
 #[test]

@@ -1,12 +1,14 @@
 //! How long to record: the bound against tables, exact sums and the exact Gaussian information; the command.
 
 use kfdesign::identify::plan::{Planned, Sampling, Thinning};
+use kfdesign::identify::{Method, identify_axis, parse_model};
 use kfdesign::noise::{Filter, NoiseModel, Term};
 use kfdesign::params::Params;
+use kfdesign::units::Unit;
 use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
 
-use super::{gauss_markov, white};
+use super::{gauss_markov, log, white};
 use crate::support::{Bench, data};
 
 /// The reference sensor, to all digits (deg/s, s).
@@ -198,6 +200,30 @@ fn beside_a_band_limit() {
     // a pole and a zero are found from the same samples
     let ratio = of(&limited, "band_limit.density") / of(&plain, "white.density");
     assert!(ratio > 1.0 && ratio < 3.0, "{ratio}");
+}
+
+/// What `identify` will know of a low-passed sensor, whose filter it has to find, is what is planned: the bound beside its estimate, to 5 % (that is of the filter that was found). With white
+/// noise that is no more than a floor there is something to be told at slow rates too, where the shape is not seen: drift as well as beside white noise.
+#[test]
+fn a_low_passed_sensor_is_planned_as_it_will_be_found() {
+    let params = Params::read(&data("low_pass/sensor.json")).unwrap();
+    let model = params.axes[0].noise();
+    let planned = Planned::new(&model);
+    let rate = log(&model.terms, 60_000, 0.005, 31, 0);
+    let unit = Unit::parse("rad/s").unwrap();
+    let found = identify_axis("x", &rate, 0.005, &unit, Method::Likelihood, &parse_model("bl2+gm").unwrap()).unwrap();
+    let known = found.precision.iter().find(|p| p.parameter == "band_limit.density").unwrap();
+    let own_rate = planned.precision(300.0, &own(200.0))[index(&planned, "band_limit.density")];
+    assert!((0.01 * known.cramer_rao_percent / own_rate - 1.0).abs() < 0.05, "{} {own_rate}", known.cramer_rao_percent);
+    let plain = Planned::new(&NoiseModel { terms: vec![white(0.0035_f64.to_radians()), model.terms[2]] });
+    for (thinning, most) in [(Thinning::Averages, 1.05), (Thinning::Decimation, 1.05)] {
+        let slow = Sampling { every: 100, thinning, ..own(200.0) };
+        let at =
+            |planned: &Planned| planned.precision(36_000.0, &slow)[index(planned, "gauss_markov.correlation_time")];
+        let ratio = at(&planned) / at(&plain);
+        // thinned, the filter has kept noise from folding down
+        assert!(ratio < most && ratio > 0.1, "{thinning:?}: {ratio}");
+    }
 }
 
 /// What is planned is what is needed, at every rate, to 1e-4 or a sample.

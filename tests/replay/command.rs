@@ -13,6 +13,27 @@ fn log_text(z: &[f64], dt: f64) -> String {
     text
 }
 
+/// A filter runs on rates: increments and angles, which other commands turn into rates, are refused, not taken for them.
+#[test]
+fn increments_are_no_rates() {
+    let bench = crate::support::Bench::new();
+    let right = skydog(0.1, 1.0, 1.0, 1.0);
+    bench.file("filter.json", right.to_json());
+    bench.file("log.csv", log_text(&draw(&right, 5, 2000), 0.1));
+    let params = crate::support::data("params.json").display().to_string();
+    for kind in ["increments", "angle"] {
+        for command in [
+            format!("replay filter.json log.csv --unit rad"),
+            format!("tune {params} --objective likelihood --log log.csv -o f.json"),
+        ] {
+            let out = bench.run(&format!("{command} --input {kind}"));
+            assert_eq!(out.status, 2, "{command}: {}", out.stdout);
+            assert!(out.stderr.contains(&format!("--input {kind}: a filter runs on rates")), "{}", out.stderr);
+        }
+    }
+    assert!(!bench.files().contains(&"f.json".to_string()));
+}
+
 /// The command on a right and on a wrong design: exit status, the document's keys, the estimates file, page and figures.
 #[test]
 fn command_end_to_end() {

@@ -83,7 +83,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let std_dev = std_dev.map_err(|message| anyhow::anyhow!("--reference-sigma: {message}"))?.si();
     let reference = Reference { std_dev, timing: design.model.dt };
     let (extra, columns) = columns(args, &design).with_context(|| args.filter.display().to_string())?;
-    let mut reader = LogReader::open(&args.log, &LogOptions { extra, ..args.reading.options()? })?;
+    let mut reader = LogReader::open(&args.log, &LogOptions { extra, ..args.reading.rates()? })?;
     let name = args.log.display().to_string();
     let mut check = reader.check().clone();
     check.expect_motion();

@@ -32,7 +32,7 @@ impl Reading<'_> {
         let name = path.display().to_string();
         let extra = aid_columns(self.aids, design)?;
         let aids = extra.len();
-        let reader = LogReader::open(path, &LogOptions { extra, ..self.flags.options()? })?;
+        let reader = LogReader::open(path, &LogOptions { extra, ..self.flags.rates()? })?;
         let mut check = reader.check().clone();
         // a plant's log is one that moves
         if design.plant != "static" {

@@ -90,6 +90,11 @@ impl<'a> Exact<'a> {
         Some((0..points.len()).map(|i| by_log.iter().map(|of_points| of_points[i]).collect()).collect())
     }
 
+    /// Of each log, at these logarithms.
+    pub(super) fn biases(data: &Ordinates, form: &Form, at: &[f64], logs: &[Vec<Stretch<'_>>]) -> Vec<LogLikelihood> {
+        Exact { data, form, logs }.each(&[at.to_vec()]).and_then(|mut each| each.pop()).unwrap_or_default()
+    }
+
     fn values(&self, points: &[Vec<f64>]) -> Vec<f64> {
         let sum = |logs: Vec<LogLikelihood>| logs.iter().map(|log| log.value).sum();
         self.each(points).map_or(vec![f64::NAN; points.len()], |each| each.into_iter().map(sum).collect())

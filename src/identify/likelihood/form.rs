@@ -6,8 +6,10 @@ use super::super::shape::{Role, roles};
 use crate::noise::{Filter, HIGHEST_ORDER, Kind, NoiseModel, Term};
 
 /// White noise beside a band limit whose shape is searched, variance over that of its innovations. An ARMA(p, p) process holds any white noise in itself, so that
-/// none of its own can be told; a filter needs some measurement noise.
-const FLOOR: f64 = 1e-5;
+/// none of its own can be told; a filter needs some measurement noise. So little, since nothing is left at half the sample rate of what no converter has followed.
+const FLOOR: f64 = 1e-9;
+/// White noise beside a band limit that is such a floor, at most.
+const LARGEST_FLOOR: f64 = 1.001e-5;
 
 /// Density, and the area ratios of poles and zeros.
 const BAND_LIMIT: [Role; 2 * HIGHEST_ORDER + 1] = {
@@ -134,8 +136,13 @@ impl Form {
 
     /// Of a model, with its logarithms; the slope of a ramp is none of them.
     pub(super) fn of(model: &NoiseModel) -> (Form, Vec<f64>) {
+        Form::with_floor(model, LARGEST_FLOOR)
+    }
+
+    /// The same, where white noise beside a band limit is a floor up to this share of its innovations.
+    pub(super) fn with_floor(model: &NoiseModel, largest: f64) -> (Form, Vec<f64>) {
         let mut pieces: Vec<(Piece, Vec<f64>)> = model.terms.iter().map(Piece::of).collect();
-        searched(&mut pieces);
+        searched(&mut pieces, largest);
         pieces.sort_by_key(|(piece, _)| *piece);
         let logs = pieces.iter().flat_map(|(_, values)| values.iter().map(|v| v.ln())).collect();
         (Form::new(pieces.into_iter().map(|(piece, _)| piece).collect()), logs)
@@ -204,8 +211,8 @@ impl Form {
     }
 }
 
-/// A band limit beside its own floor and no other white noise becomes one whose shape is searched, as it was when it was found.
-fn searched(pieces: &mut Vec<(Piece, Vec<f64>)>) {
+/// A band limit beside a floor of at most this share of its innovations, and no other white noise, becomes one whose shape is searched, as it was when it was found.
+fn searched(pieces: &mut Vec<(Piece, Vec<f64>)>, largest: f64) {
     let whites: Vec<usize> = (0..pieces.len()).filter(|i| pieces[*i].0 == Piece::White).collect();
     let limits: Vec<usize> = (0..pieces.len()).filter(|i| matches!(pieces[*i].0, Piece::Filtered(_))).collect();
     let ([white], [limit]) = (&whites[..], &limits[..]) else { return };
@@ -213,8 +220,8 @@ fn searched(pieces: &mut Vec<(Piece, Vec<f64>)>) {
     let Some(ratios) = filter.area_ratios() else { return };
     let piece = Piece::BandLimit((ratios.len() / 2) as u8);
     let values: Vec<f64> = [density].into_iter().chain(ratios).collect();
-    let Some(Term::White { density: floor }) = piece.floor(&values) else { return };
-    if (pieces[*white].1[0] / floor - 1.0).abs() < 1e-3 {
+    let white_share = (pieces[*white].1[0] / density).powi(2) / filter.innovation();
+    if white_share <= largest {
         pieces[*limit] = (piece, values);
         pieces.remove(*white);
     }

@@ -26,8 +26,8 @@ pub(in crate::identify) const MOST_POLES: u8 = 6;
 const FIRST_ORDERS: u8 = 4;
 /// A band limit that remembers longer than so many samples is drift, or a line.
 const LONGEST_MEMORY: f64 = 100.0;
-/// Peak of a band limit over its density at low frequencies, in power; what is higher is a line.
-const LARGEST_GAIN: f64 = 10.0;
+/// Peak of a band limit over its density at low frequencies, in power: resonances, and noise that rises as differences do; more, and nothing is known of that density.
+const LARGEST_GAIN: f64 = 1e4;
 /// Ratio of the correlation times from which a new Gauss-Markov process starts.
 const TIME_RATIO: f64 = 4.0;
 /// Starts that are carried to their maximum.
@@ -109,8 +109,11 @@ pub(super) fn grow(data: &Ordinates) -> Visited {
     let limited = band_limits(data, &best, 1..=FIRST_ORDERS);
     let limited = best_of(data, &mut visited, limited);
     if best.form.split(&best.logs).any(|(piece, own)| stands_for_a_limit(data, piece, own)) {
-        // it may have to grow before it is better
-        for start in limited.into_iter().chain([white]) {
+        // it may have to grow before it is better; what has taken its place may have taken that of drift too
+        let beside =
+            beside_drift(data, &white).iter().flat_map(|base| band_limits(data, base, 1..=FIRST_ORDERS)).collect();
+        let beside = best_of(data, &mut visited, beside);
+        for start in limited.into_iter().chain(beside).chain([white]) {
             grown(data, &mut visited, start, FIRST_ORDERS);
         }
     } else if let Some(limited) = limited.filter(|limited| score(limited, data) < score(&best, data)) {
@@ -145,11 +148,8 @@ pub(super) fn fit(data: &Ordinates, form: &Form) -> Option<Fit> {
     let wideband = |piece: &Piece| matches!(piece, Piece::MovingAverage(_) | Piece::BandLimit(_) | Piece::Quantization);
     rest.sort_by_key(|piece| std::cmp::Reverse(wideband(piece)));
     if let Some(Piece::BandLimit(order)) = rest.iter().find(|piece| piece.kind() == Kind::BandLimit).copied() {
-        // beside some drift, which its shape is not to follow; a small one until then
-        let beside = [vec![], starts(data, &partial, Piece::Flicker), starts(data, &partial, Piece::RandomWalk)];
-        let beside = beside.into_iter().flatten().filter_map(|(form, logs, _)| whittle::climb_all(data, &form, &logs));
-        let bases: Vec<Fit> = std::iter::once(partial.clone()).chain(beside).collect();
-        let starts: Vec<Start> = bases.iter().flat_map(|base| band_limits(data, base, order..=order)).collect();
+        let bases = beside_drift(data, &partial).into_iter().chain([partial.clone()]);
+        let starts: Vec<Start> = bases.flat_map(|base| band_limits(data, &base, order..=order)).collect();
         let found: Vec<Fit> =
             starts.par_iter().filter_map(|(form, logs, _)| whittle::climb_all(data, form, logs)).collect();
         let best = found.into_iter().filter(limits).max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))?;
@@ -171,6 +171,12 @@ pub(super) fn fit(data: &Ordinates, form: &Form) -> Option<Fit> {
         partial = found.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))?;
     }
     Some(partial)
+}
+
+/// White noise beside some drift, which the shape of a band limit is not to follow.
+fn beside_drift(data: &Ordinates, white: &Fit) -> Vec<Fit> {
+    let drift = [Piece::Flicker, Piece::RandomWalk].into_iter().flat_map(|piece| starts(data, white, piece));
+    drift.filter_map(|(form, logs, _)| whittle::climb_all(data, &form, &logs)).collect()
 }
 
 /// The best of the fits from `moves`, if its score is lower than that of `best`.

@@ -28,7 +28,7 @@ use super::shape::Role;
 use super::{Candidate, Identified, IdentifyError, ModelChoice, Precision as Known, bias, entry, usable};
 use crate::allan::{self, AllanCurve, Deviation, Pooled, TauGrid, deviation};
 use crate::consistency::spectrum::departure;
-use crate::filter::likelihood::Stretch;
+use crate::filter::likelihood::{LogLikelihood, Stretch};
 use crate::noise::{Kind, NoiseModel, Term};
 use crate::numerics::distribution::NORMAL_95;
 use crate::numerics::reduce::mean;
@@ -120,7 +120,7 @@ impl Whole<'_> {
         let &Whole { name, samples, level, dt, display, choice } = self;
         let failed = |message: String| IdentifyError { message: format!("{name}: {message}") };
         let forced = *choice != ModelChoice::Auto;
-        let Candidates { data, fits, held_out, chosen, refined } = found;
+        let Candidates { data, fits, held_out, chosen, refined, biases } = found;
         let used = data.samples * data.windows as usize;
         let (Some((on_cosines, _)), Some((fitted, refined))) = (fits.get(chosen), refined) else {
             let asked = |kind: Kind| matches!(choice, ModelChoice::Terms { kinds, .. } if kinds.contains(&kind));
@@ -162,7 +162,7 @@ impl Whole<'_> {
             chosen: i == chosen,
         };
         let candidates = fits.iter().enumerate().map(candidate).collect();
-        let (bias, turn_on_bias) = match refined.as_ref().and_then(|refined| turn_on::spread(&refined.biases)) {
+        let (bias, turn_on_bias) = match turn_on::spread(&biases) {
             Some(spread) => spread.measured(display),
             None => {
                 // drift that is not told apart is there all the same
@@ -211,6 +211,8 @@ struct Candidates {
     chosen: usize,
     /// The chosen one at the maximum of the exact likelihood; `None` when there are no candidates.
     refined: Option<(Fitted, Option<Refined>)>,
+    /// Of each log; empty for one whose exact likelihood was not searched.
+    biases: Vec<LogLikelihood>,
 }
 
 /// `parts`: the log in an earlier and a later part, where it can be cut; `logs`: for the exact likelihood, if that is to have the last word.
@@ -223,6 +225,12 @@ fn choose(
     let refined = |fits: &[(Fit, Vec<Precision>)], chosen: usize| {
         fits.get(chosen).map(|(fit, known)| refine(&data, fit, known, fit, logs))
     };
+    // where the search had to do without the exact likelihood, one look at it still says what the biases are
+    let biases = |refined: &Option<(Fitted, Option<Refined>)>| match refined {
+        Some((_, Some(refined))) => refined.biases.clone(),
+        Some((Fitted { fit, .. }, None)) if logs.len() > 1 => Exact::biases(&data, &fit.form, &fit.logs, logs),
+        _ => vec![],
+    };
     let held_out = |parts: Option<[Ordinates; 2]>, fits: &[(Fit, Vec<Precision>)]| {
         parts.map_or_else(|| vec![None; fits.len()], |parts| held_out(&parts, fits))
     };
@@ -233,14 +241,16 @@ fn choose(
             let chosen = choice_of(&data, &fits, &held_out);
             whole(&data, &mut fits, chosen);
             let refined = refined(&fits, chosen);
-            Candidates { data, fits, held_out, chosen, refined }
+            let biases = biases(&refined);
+            Candidates { data, fits, held_out, chosen, refined, biases }
         }
         // what is held out chooses nothing
         ModelChoice::Terms { .. } => {
             let mut fits = fits(&data, choice);
             whole(&data, &mut fits, 0);
             let (refined, held_out) = rayon::join(|| refined(&fits, 0), || held_out(parts(), &fits));
-            Candidates { data, fits, held_out, chosen: 0, refined }
+            let biases = biases(&refined);
+            Candidates { data, fits, held_out, chosen: 0, refined, biases }
         }
     }
 }
@@ -344,7 +354,9 @@ fn moved(
             // where the likelihood is flat its maximum moves far, its limits do not; one that it has passed is none
             old => old.filter(|old| side * (old - to) > 0.0),
         };
-        let [lower, upper] = [limit(old.lower, -1.0), limit(old.upper, 1.0)];
+        // a limit on the wrong side is none
+        let lower = limit(old.lower, -1.0).filter(|lower| *lower <= to);
+        let upper = limit(old.upper, 1.0).filter(|upper| *upper >= to);
         let told = old.told || (lower.is_some() && upper.is_some());
         Precision { sigma, bound: old.bound / more.sqrt(), lower, upper, told }
     };

@@ -15,6 +15,9 @@ const WIDTH: f64 = 1.0 / 40.0;
 const NYQUIST_WIDTH: f64 = 0.2;
 /// A log with more of its power than this at one frequency is a sinusoid.
 const TONE: f64 = 0.98;
+/// A bin is halved while its halves, or its middle and its ends, differ in power by more than this in ln, and by more than so many standard deviations.
+const LEVEL: f64 = 0.1;
+const SURE: f64 = 2.0;
 /// A line's surroundings are binned this finely: each bin is at most this share of its distance from the line.
 const LINE_WIDTH: f64 = 0.25;
 
@@ -57,6 +60,11 @@ impl Ordinates {
     ///
     /// Coefficients of a ramp of slope 1: r_j = −√(2/n) dt cos(πj/2n)/(2 sin²(πj/2n)) for odd j, else 0 (summation by parts).
     pub(super) fn new(x: &[f64], dt: f64, lines: Option<&[Line]>) -> Ordinates {
+        Ordinates::in_bins(x, dt, lines, |_, layout| layout)
+    }
+
+    /// `bins`: of the coefficients and the bins that lines ask for.
+    fn in_bins(x: &[f64], dt: f64, lines: Option<&[Line]>, bins: impl FnOnce(&[f64], Layout) -> Layout) -> Ordinates {
         let n = x.len();
         let mut coefficients = cosine_transform(x);
         let root = dt.sqrt();
@@ -81,22 +89,34 @@ impl Ordinates {
             let power = own.iter().map(|c| c * c).sum();
             Bin { frequency_hz: middle(first, size) * step, count: size as f64, power, with_ramp, ramp }
         };
-        let bins: Vec<Bin> = layout(coefficients.len(), step, &lines).into_par_iter().map(bin).collect();
+        let layout = bins(&coefficients, layout(coefficients.len(), step, &lines));
+        let bins: Vec<Bin> = layout.into_par_iter().map(bin).collect();
         let grid = Grid::new(bins.iter().map(|bin: &Bin| bin.frequency_hz).collect(), dt);
         Ordinates { bins, grid, lines, samples: n, windows: 1.0, dt }
     }
 
     /// Stretches of one length, with the lines that stand out of any of them; `None` of none.
     pub(super) fn of_several(rates: &[&[f64]], dt: f64) -> Option<Ordinates> {
+        let fine = |coefficients: &[f64], layout: Layout| halved(coefficients, layout);
+        if let [rate] = rates {
+            return Some(Ordinates::in_bins(rate, dt, None, fine));
+        }
         let alone: Vec<Ordinates> = rates.par_iter().map(|rate| Ordinates::new(rate, dt, None)).collect();
         let mut lines: Vec<Line> = alone.iter().flat_map(|own| own.lines.iter().copied()).collect();
         lines.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
         lines.dedup_by(|b, a| b.frequency_hz - a.frequency_hz < a.width_hz.max(b.width_hz));
-        let again = |(rate, own): (&&[f64], Ordinates)| match own.lines == lines {
-            true => own,
-            false => Ordinates::new(rate, dt, Some(&lines)),
+        // all in the bins that the first asks for
+        let first = Ordinates::in_bins(rates.first()?, dt, Some(&lines), fine);
+        let sizes: Vec<usize> = first.bins.iter().map(|bin| bin.count as usize).collect();
+        let same = |_: &[f64], _: Layout| {
+            let place = |next: &mut usize, size: &usize| {
+                *next += size;
+                Some((*next - size, *size))
+            };
+            sizes.iter().scan(0, place).collect()
         };
-        Ordinates::pooled(&rates.par_iter().zip(alone).map(again).collect::<Vec<_>>())
+        let others = rates[1..].par_iter().map(|rate| Ordinates::in_bins(rate, dt, Some(&lines), same));
+        Ordinates::pooled(&[vec![first], others.collect()].concat())
     }
 
     /// Windows of the same length and lines taken together; `None` of none.
@@ -159,8 +179,11 @@ impl Ordinates {
     pub(super) fn tone(&self) -> Option<(f64, f64)> {
         let step = 1.0 / (2.0 * self.span_s());
         let density = |bin: &&Bin| bin.power / bin.count;
-        let fast = |bin: &&Bin| bin.frequency_hz > ALONE as f64 * step;
-        let top = self.bins.iter().filter(fast).max_by(|a, b| density(a).total_cmp(&density(b)))?.frequency_hz;
+        let top = self.bins.iter().max_by(|a, b| density(a).total_cmp(&density(b)))?.frequency_hz;
+        // drift has most of its power in the lowest
+        if top <= ALONE as f64 * step {
+            return None;
+        }
         let near = |bin: &&Bin| (bin.frequency_hz - top).abs() <= ALONE as f64 * step + 0.5 * bin.count * step;
         let all: f64 = self.bins.iter().map(|bin| bin.power).sum();
         let own =
@@ -180,7 +203,32 @@ impl Ordinates {
 }
 
 /// How many coefficients come before each bin, and how many are in it.
-fn layout(coefficients: usize, step: f64, lines: &[Line]) -> Vec<(usize, usize)> {
+type Layout = Vec<(usize, usize)>;
+
+/// The bins, halved where the spectrum changes within them: at the zeros of an average, on the skirts of a filter.
+fn halved(coefficients: &[f64], layout: Layout) -> Layout {
+    let mut done = Layout::new();
+    let mut left: Layout = layout.into_iter().rev().collect();
+    while let Some((first, size)) = left.pop() {
+        let quarter = size / 4;
+        let power = |part: usize| {
+            let start = first + part * quarter;
+            coefficients[start..start + quarter].iter().map(|c| c * c).sum::<f64>()
+        };
+        let [a, b, c, d] = [0, 1, 2, 3].map(power);
+        // each side has 2 · quarter coefficients, the logarithm of its power a variance of 1/quarter
+        let far = |ratio: f64| ratio.ln().abs() > LEVEL.max(SURE * (2.0 / quarter as f64).sqrt());
+        if quarter > 1 && (far((a + b) / (c + d)) || far((a + d) / (b + c))) {
+            let half = size / 2;
+            left.extend([(first + half, size - half), (first, half)]);
+        } else {
+            done.push((first, size));
+        }
+    }
+    done
+}
+
+fn layout(coefficients: usize, step: f64, lines: &[Line]) -> Layout {
     let mut bins = Vec::new();
     let mut first = 0;
     while first < coefficients {

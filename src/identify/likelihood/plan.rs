@@ -20,6 +20,14 @@ use crate::signal::lines::Line;
 /// The longest log that is thought of: ten years, s.
 pub const LONGEST_S: f64 = 10.0 * 365.25 * 86_400.0;
 
+/// White noise beside a band limit of at most this share of the variance of its innovations is not told from it.
+const FLOOR: f64 = 0.05;
+/// Zeros on the unit circle, where a search does not come to, are moved in to this.
+const LARGEST_ZERO: f64 = 0.98;
+/// What is thought of the logarithm of an area ratio beforehand, one over its variance: nothing that matters where the log tells it, and the rest stays finite
+/// where the samples are too slow to.
+const SHAPE: f64 = 0.01;
+
 /// How the samples of a log are made of those of the sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -70,7 +78,13 @@ pub struct Planned {
 
 impl Planned {
     pub fn new(model: &NoiseModel) -> Planned {
-        let (form, logs) = Form::of(model);
+        let within = |term: &Term| match *term {
+            Term::BandLimit { density, filter } => {
+                Term::BandLimit { density, filter: filter.zeros_within(LARGEST_ZERO) }
+            }
+            other => other,
+        };
+        let (form, logs) = Form::with_floor(&NoiseModel { terms: model.terms.iter().map(within).collect() }, FLOOR);
         let known: Vec<String> = (0..logs.len()).map(|i| name_of(&form, i)).collect();
         // none of the white noise that only goes with a band limit
         let place = |name: &str| known.iter().position(|known| known == name);
@@ -126,7 +140,11 @@ impl Planned {
         };
         let lines: Vec<Line> = self.lines.iter().map(line).collect();
         let data = Ordinates::expected(samples, dt, &lines, grid);
-        let covariance = covariance(&whittle::expected_information(&data, &self.form, &self.logs));
+        let mut information = whittle::expected_information(&data, &self.form, &self.logs);
+        for (i, (_, role)) in self.form.roles().into_iter().enumerate() {
+            information[(i, i)] += if role == Role::Shape { SHAPE } else { 0.0 };
+        }
+        let covariance = covariance(&information);
         let ramps = self.form.count(Kind::RateRamp);
         let of = |(_, origin): &(String, Origin)| match (*origin, &covariance) {
             (Origin::Log(i), Some(c)) => c[(i, i)].sqrt(),

@@ -47,6 +47,25 @@ fn gaps_cost_no_more_than_what_is_missing() {
     assert!(found.exact_log_likelihood.unwrap() > 3.0 * alone.exact_log_likelihood.unwrap());
 }
 
+/// So many samples of so many states that the search does without the exact likelihood: the spread of three starts is told all the same, from one look at it. Sample standard deviation to 5 %
+/// (each bias is known to 0.02, the spread is 1).
+#[test]
+fn the_turn_on_bias_of_long_logs_is_told_too() {
+    let filter =
+        kfdesign::noise::Filter::new(&[1.0, 2.0, 1.0], &[1.0, -1.142_980_502_539_901_1, 0.412_801_598_096_188_77]);
+    let terms = [white(0.0001), Term::BandLimit { density: 0.1, filter: filter.unwrap() }, gauss_markov(0.05, 20.0)];
+    let starts = [-1.0, 0.0, 1.0];
+    let of = |i: usize| log(&terms, 80_000, 0.01, 8, i as u64).iter().map(|x| x + starts[i]).collect::<Vec<f64>>();
+    let all: Vec<Vec<f64>> = (0..3).map(of).collect();
+    let logs: Vec<Vec<Stretch<'_>>> = all.iter().map(|x| vec![Stretch { missing: 0, samples: x }]).collect();
+    let stretches: Vec<&[f64]> = all.iter().map(|x| &x[..]).collect();
+    let unit = Unit::parse("rad/s").unwrap();
+    let found = identify_logs("x", &stretches, &logs, 0.01, &unit, &parse_model("bl2+gm").unwrap()).unwrap();
+    assert!(found.exact_log_likelihood.is_none(), "the search was on the exact likelihood");
+    assert!((found.params.turn_on_bias.unwrap().si() - 1.0).abs() < 0.05);
+    assert!(found.params.bias.unwrap().si().abs() < 0.05);
+}
+
 /// Twelve starts of an hour with biases of known spread: what each log says of its bias is exact beside that spread, so the estimate is their sample standard
 /// deviation (the restricted likelihood divides by m − 1) to 2 %, and its 95 % interval that of χ²₁₁, 0.71 … 1.70 of it, to 10 % (profile for exact).
 #[test]

@@ -73,6 +73,9 @@ fn a_sinusoid_alone_is_told() {
     let mut noisy = log(&[white(0.01)], 30_000, dt, 78, 0);
     tone(0.4, 1.0, dt, &mut noisy);
     assert_eq!(told(&identify(&noisy, dt, &parse_model("white").unwrap())), None);
+    // a walk has as much of its power at its lowest frequencies, and is none
+    let walk = log(&[white(0.001), Term::RateRandomWalk { density: 1.0 }], 30_000, dt, 79, 0);
+    assert_eq!(told(&identify(&walk, dt, &parse_model("white+rrw").unwrap())), None);
 }
 
 /// Eight minutes of drift of 100 s, model given: often the drift is not identified, but it moves the mean of the log, and the interval of the bias counts it. Of 40 intervals that would hold the

@@ -398,7 +398,8 @@ fn recipe_is_faithful_and_says_what_it_costs() {
     assert!((value(3) * 1.89 / tau_max - 1.0).abs() < 1e-3);
     assert!(found.steps[3].cost.contains("degrees of freedom"), "{}", found.steps[3].cost);
     assert!(found.steps[4].cost.contains("not a flicker floor"), "{}", found.steps[4].cost);
-    // the recipe gives no intervals, and B is not part of its model
+    // the recipe gives no intervals, not even of the bias, and B is not part of its model
+    assert_eq!(found.params.bias.unwrap().interval, None);
     assert_eq!(label(&found.model), "GaussMarkov+White");
     for entry in &found.params.terms {
         match entry {

@@ -5,9 +5,10 @@ mod holes;
 mod inflate;
 mod pieces;
 
+use kfdesign::compare::parameters::parameters;
 use kfdesign::compare::{Comparison, Log, LogAxis, compare};
 use kfdesign::consistency::{Test, Verdict};
-use kfdesign::noise::Term;
+use kfdesign::noise::{Filter, Term};
 use kfdesign::params::{AxisParams, Measured, Params, TermEntry};
 use kfdesign::simulate::{Scenario, Simulator, TrueRate};
 use kfdesign::units::{Quantity, Unit};
@@ -246,4 +247,20 @@ fn the_command_writes_one_document_and_its_views() {
     let out = bench.run("compare loud.json log.npy");
     assert_eq!(out.status, 1);
     assert!(out.stdout.contains("\ninconsistent: x: ") && out.stdout.contains("proves nothing"), "{}", out.stdout);
+}
+
+/// What of a file is held against all white noise of a log is named for what it is.
+#[test]
+fn white_noise_in_parts_is_not_called_white() {
+    let filter = Filter::new(&[1.0], &[1.0, -0.5]).unwrap();
+    for (terms, name) in [
+        (vec![WHITE], "white.density"),
+        (vec![WHITE, Term::MovingAverage { density: 0.1, samples: 2 }], "wideband.density"),
+        (vec![WHITE, Term::BandLimit { density: 0.1, filter }], "wideband.density"),
+    ] {
+        let file = params(&terms);
+        let rows = parameters(&file, &log(&file, 2000, 0), &Unit::parse("rad/s").unwrap()).unwrap();
+        assert_eq!(rows[0].parameter, name);
+        assert!(rows[0].meaning.starts_with("x: your file says N = "), "{}", rows[0].meaning);
+    }
 }

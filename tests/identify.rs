@@ -398,7 +398,8 @@ fn recipe_is_faithful_and_says_what_it_costs() {
     assert!((value(3) * 1.89 / tau_max - 1.0).abs() < 1e-3);
     assert!(found.steps[3].cost.contains("degrees of freedom"), "{}", found.steps[3].cost);
     assert!(found.steps[4].cost.contains("not a flicker floor"), "{}", found.steps[4].cost);
-    // the recipe gives no intervals, and B is not part of its model
+    // the recipe gives no intervals, not even of the bias, and B is not part of its model
+    assert_eq!(found.params.bias.unwrap().interval, None);
     assert_eq!(label(&found.model), "GaussMarkov+White");
     for entry in &found.params.terms {
         match entry {
@@ -512,7 +513,12 @@ fn model_names() {
         ("gm", "white must be part"),
         ("white+rrw+rrw", "stands twice"),
         ("white+gm+gm+gm+gm", "more than three"),
-        ("white+ma+ma", "stands twice"),
+        ("white+ma+ma2", "'ma2': a model has one average at most"),
+        ("bl2+bl3", "'bl3': a model has one band limit at most"),
+        ("bl7", "'bl7': a band limit has 1 to 6 poles"),
+        ("bl0", "'bl0': a band limit has 1 to 6 poles"),
+        ("white+ma99", "'ma99': an average is over 2 to 16 samples"),
+        ("white+ma1", "'ma1': an average is over 2 to 16 samples"),
         ("", "unknown term ''"),
     ] {
         let error = parse_model(bad).unwrap_err().to_string();

@@ -11,7 +11,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::log_flags::{LogFlags, print_check};
-use super::output::{digits, print_json, print_text, progress, table};
+use super::output::{digits, print_json, print_text, progress, refuse_same_output, table};
 use super::stretch::{Stretch, into_stretches};
 use super::{Status, allan_figure};
 use crate::allan::{self, AllanCurve, Deviation, NoiseType, TauGrid};
@@ -44,7 +44,7 @@ pub struct Args {
     output: Option<PathBuf>,
     /// Read the log in windows of this length and average their squares, for logs too long for memory: 24h, 30min
     /// [default: whole; files above 4 GiB in windows of 10 000 000 samples]
-    #[arg(long, value_name = "DURATION")]
+    #[arg(long, value_name = "DURATION", allow_hyphen_values = true)]
     window: Option<String>,
     #[command(flatten)]
     reading: LogFlags,
@@ -169,6 +169,7 @@ struct Header {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
+    refuse_same_output(&[("-o", &args.output), ("--plot", &args.plot)])?;
     for output in args.output.iter().chain(&args.plot) {
         atomic::check_output(output, &args.log)?;
     }

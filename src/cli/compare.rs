@@ -8,7 +8,7 @@ use anyhow::{Context, anyhow, bail};
 
 use super::Status;
 use super::log_flags::{LogFlags, print_check};
-use super::output::{digits, notes, print_json, print_text, table};
+use super::output::{digits, notes, print_json, print_text, refuse_same_output, table};
 use super::stretch::stretches;
 use super::tests_table::{TESTS, caption, rows};
 use crate::compare::parameters::parameters;
@@ -78,14 +78,15 @@ impl Pair {
     }
 }
 
-/// Reads both, prints the log check, and refuses to overwrite either with one of `outputs`.
+/// Reads both, prints the log check, and refuses to overwrite either with one of `outputs`, named with their flags.
 pub(super) fn read(
     params: &Path,
     log: &Path,
     reading: &LogFlags,
-    outputs: &[&Option<PathBuf>],
+    outputs: &[(&str, &Option<PathBuf>)],
 ) -> anyhow::Result<Pair> {
-    for output in outputs.iter().copied().flatten() {
+    refuse_same_output(outputs)?;
+    for output in outputs.iter().filter_map(|(_, path)| path.as_ref()) {
         atomic::check_output(output, log)?;
         atomic::refuse_input_as_output(output, params)?;
     }
@@ -148,7 +149,8 @@ fn of_quantity(mut given: Vec<Params>, quantity: Quantity, path: &Path) -> anyho
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     compare::check_alpha(args.alpha)?;
-    let pair = read(&args.params, &args.log, &args.reading, &[&args.output, &args.report, &args.plot])?;
+    let outputs = [("-o", &args.output), ("--report", &args.report), ("--plot", &args.plot)];
+    let pair = read(&args.params, &args.log, &args.reading, &outputs)?;
     pair.print_left_out(&pair.log.axes.iter().map(|axis| &*axis.name).collect::<Vec<_>>());
     let mut result =
         compare::compare(&pair.params, &pair.log, args.alpha).with_context(|| args.log.display().to_string())?;

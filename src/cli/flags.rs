@@ -1,8 +1,15 @@
 //! Flag values with units.
 
+use std::str::FromStr;
+
 use anyhow::{Context, anyhow};
 
 use crate::units::{Dimension, Unit};
+
+/// A number of things, or a seed.
+pub(super) fn whole<T: FromStr>(text: &str) -> Result<T, String> {
+    text.parse().map_err(|_| "expected a whole number of at least 0".into())
+}
 
 /// A number with its unit, such as `2h`, `250 deg/s`, `1/131 deg/s` or `-1deg/s`, in SI.
 pub(super) fn with_unit(flag: &str, text: &str, dimension: Dimension, example: &str) -> anyhow::Result<f64> {

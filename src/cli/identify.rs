@@ -15,7 +15,7 @@ use serde::Serialize;
 use super::Status;
 use super::allan::AxisCurve;
 use super::log_flags::{LogFlags, print_check};
-use super::output::{digits, duration, print_json, print_text, progress, table};
+use super::output::{digits, duration, print_json, print_text, progress, refuse_same_output, table};
 use super::stretch::{Stretch, stretches};
 use crate::allan::wavelet::{self, Level};
 use crate::export::atomic;
@@ -49,12 +49,12 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = MethodArg::Likelihood)]
     method: MethodArg,
     /// Terms of the model: auto, or white+gm, white+rrw … (terms: white, gm (up to three), rrw, flicker, quantization, ramp; for likelihood
-    /// also osc and ma)
+    /// also osc, ma (ma2 … ma16: an average over so many samples) and, in the place of white, bl (bl1 … bl6: a band limit of so many poles))
     #[arg(long, value_name = "MODEL", default_value = "auto")]
     model: String,
     /// Read the log in windows of this length and multiply their likelihoods, for logs too long for memory: 24h, 30min
     /// [default: whole; files above 4 GiB in windows of 10 000 000 samples]
-    #[arg(long, value_name = "DURATION")]
+    #[arg(long, value_name = "DURATION", allow_hyphen_values = true)]
     window: Option<String>,
     /// Leave outliers out: samples farther from their surroundings than noise goes
     #[arg(long)]
@@ -219,9 +219,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
             args.model
         );
     }
+    let by_curve = matches!(args.method, MethodArg::Allan | MethodArg::Gmwm);
+    if let Some(reason) = choice.beyond_a_curve().filter(|_| by_curve) {
+        bail!("--model {}: {reason}", args.model);
+    }
     if args.logs.len() > 1 && args.method != MethodArg::Likelihood {
         bail!("{} logs: only --method likelihood takes more than one", args.logs.len());
     }
+    refuse_same_output(&[("-o", &args.output), ("--report", &args.report), ("--plot", &args.plot)])?;
     for output in [&args.output, &args.report, &args.plot].into_iter().flatten() {
         args.logs.iter().try_for_each(|log| atomic::check_output(output, log))?;
     }

@@ -6,7 +6,7 @@ use anyhow::bail;
 
 use super::Status;
 use super::identify::tables::term_rows;
-use super::output::{digits, print_json, print_text, table};
+use super::output::{digits, print_json, print_text, refuse_same_output, table};
 use crate::export::atomic;
 use crate::import::{self, Imported};
 use crate::params::Params;
@@ -37,6 +37,7 @@ pub struct Args {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     check_rate(args.rate)?;
+    refuse_same_output(&[("-o", &args.output), ("--accelerometer", &args.accelerometer)])?;
     for output in [&args.output, &args.accelerometer].into_iter().flatten() {
         atomic::check_output(output, &args.file)?;
     }

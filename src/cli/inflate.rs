@@ -39,7 +39,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if let Some(from) = args.from.filter(|f| !(f.is_finite() && *f > 0.0)) {
         bail!("--from is {from}, expected a frequency above 0 Hz");
     }
-    let pair = read(&args.params, &args.log, &args.reading, &[&args.output])?;
+    let pair = read(&args.params, &args.log, &args.reading, &[("-o", &args.output)])?;
     let name = args.log.display().to_string();
     let from = args.from.unwrap_or_else(|| usual_from_hz(pair.log.sample_rate_hz));
     let mut found = inflation(&pair.params, &pair.log, from).with_context(|| name.clone())?;

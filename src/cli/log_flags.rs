@@ -27,10 +27,10 @@ pub struct LogFlags {
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub rate: Option<f64>,
     /// Skip what is before this time from the start of the log: seconds, or with a unit (`10min`)
-    #[arg(long, value_name = "TIME", allow_negative_numbers = true)]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     pub start: Option<String>,
     /// Stop at this time from the start of the log
-    #[arg(long, value_name = "TIME", allow_negative_numbers = true)]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     pub end: Option<String>,
     /// What the values are
     #[arg(long, value_enum, default_value_t = InputArg::Rate)]

@@ -16,8 +16,8 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
 use super::Status;
-use super::flags::with_unit;
-use super::output::{digits, print_text, progress};
+use super::flags::{whole, with_unit};
+use super::output::{digits, print_text, progress, refuse_same_output};
 use crate::consistency::Verdict;
 use crate::export::{atomic, junit};
 use crate::filter::FilterDesign;
@@ -53,7 +53,7 @@ pub struct Args {
     /// Length of a run, for example 600s or 2h
     #[arg(long, default_value = "600s", value_name = "TIME", allow_hyphen_values = true)]
     duration: String,
-    #[arg(long, default_value_t = 1, value_name = "N")]
+    #[arg(long, default_value_t = 1, value_name = "N", value_parser = whole::<u64>, allow_negative_numbers = true)]
     seed: u64,
     /// Probability of a false alarm, over all tests and axes together
     #[arg(long, default_value_t = 0.01, value_name = "P", allow_hyphen_values = true)]
@@ -65,10 +65,11 @@ pub struct Args {
     #[arg(long)]
     truth_spread: bool,
     /// Measure the false-alarm probability with this many whole experiments, not from the law of the statistics
-    #[arg(long, default_value_t = 0, value_name = "N")]
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = whole::<u64>, allow_negative_numbers = true)]
     replicates: u64,
     /// Simulate this run alone; -o takes its numbers (.csv, .csv.gz or .npy)
-    #[arg(long, value_name = "NUMBER", conflicts_with_all = ["runs", "resume", "replicates", "json", "junit", "report", "power", "plan", "confirm"])]
+    #[arg(long, value_name = "NUMBER", value_parser = whole::<u64>, allow_negative_numbers = true,
+        conflicts_with_all = ["runs", "resume", "replicates", "json", "junit", "report", "power", "plan", "confirm"])]
     run: Option<u64>,
     /// Average NEES and NIS at every step, as a table (.csv, .csv.gz or .npy)
     #[arg(long, value_name = "FILE", conflicts_with = "run")]
@@ -77,7 +78,7 @@ pub struct Args {
     #[arg(long, requires = "output")]
     resume: bool,
     /// Threads; the results do not depend on it
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = whole::<usize>, allow_negative_numbers = true)]
     threads: Option<usize>,
     #[command(flatten)]
     outputs: Outputs,
@@ -115,7 +116,7 @@ struct Outputs {
     #[arg(long)]
     power: bool,
     /// Simulate each of these sizes, and the given truth, in this many whole experiments and count what is caught
-    #[arg(long, default_value_t = 0, value_name = "N")]
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = whole::<u64>, allow_negative_numbers = true)]
     confirm: u64,
     /// How many runs, or how long ones, see this mistuning: \"gauss_markov.std_dev x1.3\" (the filter's value is 1.3 times the true one)
     #[arg(long, value_name = "\"PARAMETER xFACTOR\"")]
@@ -124,11 +125,7 @@ struct Outputs {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let inputs: Vec<&Path> = std::iter::once(args.filter.as_path()).chain(args.truth.as_deref()).collect();
-    if let Some(path) = &args.every_step {
-        args.outputs.check(&[path])?;
-        inputs.iter().try_for_each(|input| atomic::check_output(path, input))?;
-    }
-    args.outputs.check(&inputs)?;
+    args.outputs.check(&inputs, &args.every_step)?;
     let design = FilterDesign::read(&args.filter)?;
     let truth = args.truth.as_deref().map(Params::read).transpose()?;
     let duration_s = with_unit("--duration", &args.duration, Dimension::TIME, "600s")?;
@@ -272,7 +269,7 @@ fn many_runs(args: &Args, experiment: &Experiment, course: &Course) -> anyhow::R
 
 pub(super) fn merge(args: &MergeArgs) -> anyhow::Result<Status> {
     let inputs: Vec<&Path> = args.shards.iter().map(PathBuf::as_path).collect();
-    args.outputs.check(&inputs)?;
+    args.outputs.check(&inputs, &None)?;
     let shards = args.shards.iter().map(|path| Shard::read(path)).collect::<Result<Vec<_>, _>>()?;
     let shards = document::in_order(shards)?;
     let (Some(first), Some(last)) = (shards.first(), shards.last()) else { bail!("nothing to merge") };
@@ -294,21 +291,16 @@ fn is_ordinary(path: &Path) -> bool {
 }
 
 impl Outputs {
-    /// No output is an input or another output.
-    fn check(&self, inputs: &[&Path]) -> anyhow::Result<()> {
+    /// No output, among them the table of every step, is an input or another output.
+    fn check(&self, inputs: &[&Path], every_step: &Option<PathBuf>) -> anyhow::Result<()> {
         if self.confirm > MAX_REPLICATES {
             bail!("--confirm {}: expected at most {MAX_REPLICATES} experiments", self.confirm);
         }
-        let outputs: Vec<&PathBuf> = [&self.output, &self.junit, &self.report].into_iter().flatten().collect();
-        for (i, output) in outputs.iter().enumerate() {
-            for input in inputs {
-                atomic::check_output(output, input)?;
-            }
-            let same = |other: &&PathBuf| std::path::absolute(other).ok() == std::path::absolute(output).ok();
-            // a device, such as /dev/null, may take several
-            if is_ordinary(output) && outputs[..i].iter().any(same) {
-                bail!("{}: cannot write: it is the name of two outputs; give each its own", output.display());
-            }
+        let outputs =
+            [("-o", &self.output), ("--junit", &self.junit), ("--report", &self.report), ("--every-step", every_step)];
+        refuse_same_output(&outputs)?;
+        for output in outputs.iter().filter_map(|(_, path)| path.as_ref()) {
+            inputs.iter().try_for_each(|input| atomic::check_output(output, input))?;
         }
         Ok(())
     }

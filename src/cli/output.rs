@@ -1,7 +1,9 @@
 //! Tables, JSON, progress: how every command speaks.
 
 use std::io::Write;
+use std::path::{Path, PathBuf};
 
+use anyhow::bail;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
@@ -21,6 +23,29 @@ pub fn print_text(text: &str) -> anyhow::Result<()> {
     out.write_all(text.as_bytes())?;
     out.flush()?;
     Ok(())
+}
+
+/// Refuses, before the work, two outputs of one name. A device or a pipe (`/dev/null`) may take several. `outputs`: with their flags.
+pub fn refuse_same_output(outputs: &[(&str, &Option<PathBuf>)]) -> anyhow::Result<()> {
+    let mut files: Vec<(&str, PathBuf)> = Vec::new();
+    for (flag, path) in outputs.iter().filter_map(|(flag, path)| Some((*flag, path.as_deref()?))) {
+        if path.exists() && !path.is_file() {
+            continue;
+        }
+        let place = place(path);
+        if let Some((first, _)) = files.iter().find(|(_, other)| *other == place) {
+            bail!("{}: named by both {first} and {flag}; give them different names", path.display());
+        }
+        files.push((flag, place));
+    }
+    Ok(())
+}
+
+/// Where a file is, or will be: links followed, `./` left out.
+fn place(path: &Path) -> PathBuf {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let new = || Some(folder.canonicalize().ok()?.join(path.file_name()?));
+    path.canonicalize().ok().or_else(new).unwrap_or_else(|| path.to_path_buf())
 }
 
 /// True when the reader of our stdout went away.

@@ -28,7 +28,7 @@ pub struct Args {
     #[arg(long, value_name = "NAME")]
     parameter: String,
     /// Relative standard deviation, 1 sigma: 10% or 0.1
-    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SHARE", allow_hyphen_values = true)]
     precision: String,
     /// One axis [default: every axis that has the parameter]
     #[arg(long, value_name = "NAME")]

@@ -12,7 +12,7 @@ use super::Status;
 use super::aid_columns::aid_columns;
 use super::flags::with_unit;
 use super::log_flags::{LogFlags, print_check};
-use super::output::{digits, print_json, print_text, progress, shown_unit, table};
+use super::output::{digits, print_json, print_text, progress, refuse_same_output, shown_unit, table};
 use super::tests_table::{TESTS, caption, rows};
 use crate::consistency::{Test, Verdict};
 use crate::export::atomic::{AtomicFile, refuse_input_as_output};
@@ -56,9 +56,10 @@ pub struct Args {
     /// How the filter carries its covariance
     #[arg(long, value_enum, default_value_t = FormFlag::Joseph, conflicts_with = "smooth")]
     form: FormFlag,
-    /// Find the wideband noise (white, moving average, quantization, lines) anew as the log goes on, from its last samples: 1000s, 20min. Until there are
-    /// as many the design stands for the rest, so no longer than the log it was identified from; only for a sensor at rest
-    #[arg(long, value_name = "DURATION", conflicts_with = "smooth")]
+    /// Find the wideband noise (white, moving average, band limit, quantization, lines, Gauss-Markov processes of a few samples) anew as the log goes on,
+    /// from its last samples: 1000s, 20min. Until there are as many the design stands for the rest, so no longer than the log it was identified from;
+    /// only for a sensor at rest
+    #[arg(long, value_name = "DURATION", conflicts_with = "smooth", allow_hyphen_values = true)]
     follow: Option<String>,
     /// One HTML page with tables and figures
     #[arg(long, value_name = "FILE.html")]
@@ -102,6 +103,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         follow: args.follow.as_deref().map(|text| with_unit("--follow", text, Dimension::TIME, "1000s")).transpose()?,
     };
     options.check()?;
+    refuse_same_output(&[("-o", &args.output), ("--report", &args.report), ("--plot", &args.plot)])?;
     if AttitudeDesign::is(&args.filter) {
         return attitude::run(args);
     }

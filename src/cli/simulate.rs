@@ -6,7 +6,7 @@ use anyhow::{Context, anyhow, bail};
 use serde::Serialize;
 
 use super::Status;
-use super::flags::with_unit;
+use super::flags::{whole, with_unit};
 use super::output::{digits, print_json, print_text, progress, shown_unit, table};
 use super::tune::plant_flags::PlantFlags;
 use crate::export::atomic;
@@ -29,13 +29,13 @@ pub struct Args {
     #[arg(short, long, value_name = "LOG")]
     output: PathBuf,
     /// Length: 2h, 600s, 90min, "1.5 h" [default: that of the true-rate file, if there is one]
-    #[arg(long, value_name = "TIME")]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     duration: Option<String>,
     /// Seed of all random numbers
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = whole::<u64>, allow_negative_numbers = true)]
     seed: u64,
     /// Number of the run: another run of the same seed is independent of this one
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = whole::<u64>, allow_negative_numbers = true)]
     run: u64,
     /// Sample rate in Hz [default: sample_rate of the parameters]
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
@@ -47,10 +47,10 @@ pub struct Args {
     #[arg(long)]
     turn_on: bool,
     /// Largest value the sensor can show, with unit: "250 deg/s"
-    #[arg(long, value_name = "LIMIT")]
+    #[arg(long, value_name = "LIMIT", allow_hyphen_values = true)]
     saturate: Option<String>,
     /// Step of the output, with unit: "1/131 deg/s"
-    #[arg(long, value_name = "STEP", alias = "quantize")]
+    #[arg(long, value_name = "STEP", alias = "quantize", allow_hyphen_values = true)]
     quantise: Option<String>,
     /// Unit of the columns [default: that of the parameters]
     #[arg(long, value_name = "UNIT")]

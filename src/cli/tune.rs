@@ -20,8 +20,9 @@ use self::logs::Reading;
 use self::objective::{ObjectiveArg, ObjectiveFlags};
 use self::plant_flags::PlantFlags;
 use super::Status;
+use super::flags::whole;
 use super::log_flags::LogFlags;
-use super::output::{print_json, print_text, progress};
+use super::output::{print_json, print_text, progress, refuse_same_output};
 use crate::consistency::Verdict;
 use crate::export::atomic;
 use crate::montecarlo::{Outcome, Plan, verify};
@@ -50,10 +51,10 @@ pub struct Args {
     #[arg(long, value_name = "PARAMS")]
     truth: Option<PathBuf>,
     /// Runs of the Monte Carlo
-    #[arg(long, default_value_t = 100, value_name = "N")]
+    #[arg(long, default_value_t = 100, value_name = "N", value_parser = whole::<u64>, allow_negative_numbers = true)]
     runs: u64,
     /// Seed of the Monte Carlo
-    #[arg(long, default_value_t = 1, value_name = "N")]
+    #[arg(long, default_value_t = 1, value_name = "N", value_parser = whole::<u64>, allow_negative_numbers = true)]
     seed: u64,
     /// Also say when each state is known, what better parts would buy, and what wrong parameters would cost
     #[arg(long)]
@@ -102,6 +103,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
             return compare::run(&args.choosing.compare, args.choosing.held_out, args.json, &options, &reading);
         }
     };
+    refuse_same_output(&[("-o", &args.output), ("--report", &args.report), ("--plot", &args.plot)])?;
     for output in [&args.output, &args.report, &args.plot].into_iter().flatten() {
         for input in std::iter::once(params_path).chain(&args.log).chain(&args.truth) {
             atomic::check_output(output, input)?;

@@ -336,20 +336,30 @@ fn not_wideband(model: &NoiseModel, dt: f64, ratios: &Ratios) -> Option<String> 
     })
 }
 
+/// "white and band_limit densities".
+fn densities(multiplied: &[Kind]) -> String {
+    let names = [(Kind::White, "white"), (Kind::MovingAverage, "moving_average"), (Kind::BandLimit, "band_limit")];
+    let names: Vec<&str> = names.iter().filter(|(kind, _)| multiplied.contains(kind)).map(|(_, name)| *name).collect();
+    format!("{} densities", names.join(" and "))
+}
+
 /// The parameters with every white, moving_average and band_limit density multiplied by the factor of its axis; all else as it was, and a note in `source`.
 ///
 /// The interval becomes density times the interval of the factor: the product is what the log itself shows, so that the error of the
 /// bench value cancels.
 pub fn inflated(params: &Params, found: &Inflation) -> Params {
     let mut out = params.clone();
+    let mut multiplied = Vec::new();
     for (axis, inflation) in out.axes.iter_mut().zip(&found.axes) {
         for term in &mut axis.terms {
+            let kind = term.to_term().kind();
             if let TermEntry::White { density }
             | TermEntry::MovingAverage { density, .. }
             | TermEntry::BandLimit { density, .. } = term
             {
                 density.interval = Some(inflation.interval.map(|f| f * density.value));
                 density.value *= inflation.factor;
+                multiplied.push(kind);
             }
         }
     }
@@ -360,7 +370,8 @@ pub fn inflated(params: &Params, found: &Inflation) -> Params {
     let log = found.log.as_deref().map_or(String::new(), |log| format!(" of {log}"));
     let sha = found.log_sha256.as_deref().map_or(String::new(), |sha| format!(" (SHA-256 {sha})"));
     let note = format!(
-        "white and moving_average densities multiplied: {}; noise{log}{sha} above {} Hz, kfdesign inflate",
+        "{} multiplied: {}; noise{log}{sha} above {} Hz, kfdesign inflate",
+        densities(&multiplied),
         factors.collect::<Vec<_>>().join(", "),
         digits(found.from_hz)
     );

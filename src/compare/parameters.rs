@@ -19,7 +19,7 @@ use crate::units::{Unit, digits};
 pub struct Beside {
     /// Of the parameters.
     pub axis: String,
-    /// As in params.json; `white.density` is all white noise together.
+    /// As in params.json; `wideband.density` is that of white, moving_average and band_limit together, where the file has one of the latter two.
     pub parameter: String,
     /// Of the values: that of the file.
     pub unit: String,
@@ -74,7 +74,9 @@ fn of_axis(axis: &AxisParams, log: &LogAxis, dt: f64, display: &Unit) -> Result<
     let mut rows = Vec::new();
     if let Some((value, unit)) = white(&file, dt) {
         let estimate = found.sums.white.map(|sum| of_sum(sum, format!("white noise of {}", label(&found))));
-        rows.push(beside(&file.name, "white.density", unit.from_si(value), &unit, estimate, String::new()));
+        let plain = file.terms.iter().all(|t| t.wideband_density().is_none() || matches!(t, TermEntry::White { .. }));
+        let path = if plain { "white.density" } else { "wideband.density" };
+        rows.push(beside(&file.name, path, unit.from_si(value), &unit, estimate, String::new()));
     }
     let paths: Vec<(String, Measured)> = file
         .clone()
@@ -216,7 +218,7 @@ fn beside(axis: &str, path: &str, file: f64, unit: &Unit, estimate: Option<Estim
 /// The letter of a parameter.
 fn symbol(path: &str) -> &str {
     match path {
-        "white.density" => "N",
+        "white.density" | "wideband.density" => "N",
         "rate_random_walk.density" => "K",
         "gauss_markov.std_dev" => "sigma",
         "gauss_markov.correlation_time" => "Tc",

@@ -7,7 +7,7 @@
 
 use super::points::{Distance, Points};
 use super::selection::{FIT_LEVEL, PENALTY, Table, score, search};
-use super::shape::{Role, Shape, document_name, in_allan_curve, roles, short_name};
+use super::shape::{Role, Shape, document_name, roles, short_name};
 use super::weighted_fit::{Fit, tolerated};
 use super::{
     Candidate, Identified, IdentifyError, LENGTHS_TO_TELL, ModelChoice, WIDEST_INTERVAL, bias, entry, usable,
@@ -45,11 +45,8 @@ pub(super) fn identify(
         ModelChoice::Auto => None,
         ModelChoice::Terms { kinds, .. } => Some(Shape::new(kinds.clone())),
     };
-    if let Some(kind) = forced.iter().flat_map(Shape::kinds).find(|kind| !in_allan_curve(**kind)) {
-        return Err(failed(format!(
-            "{} needs --method likelihood: averages of the log do not show it apart from white noise",
-            short_name(*kind)
-        )));
+    if let Some(reason) = choice.beyond_a_curve() {
+        return Err(failed(reason));
     }
     let table = search(&points, forced.as_ref());
     let fit = match &forced {

@@ -6,11 +6,11 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{Identified, IdentifyError, bias, entry, usable};
+use super::{Identified, IdentifyError, entry, usable};
 use crate::allan::{self, AllanCurve, AllanPoint, Deviation, TauGrid, edf};
 use crate::noise::{NoiseModel, Term};
 use crate::numerics::reduce::{Moments, Sum, mean};
-use crate::params::{AxisParams, NotIdentified};
+use crate::params::{AxisParams, Measured, NotIdentified};
 use crate::units::{Unit, digits};
 
 /// One step of the recipe.
@@ -103,7 +103,8 @@ pub(super) fn identify(name: &str, rate: &[f64], dt: f64, display: &Unit) -> Res
     Ok(Identified {
         params: AxisParams {
             name: name.into(),
-            bias: Some(bias(mean(rate), rate.len(), dt, &model, display)),
+            // without an interval: what the recipe reads of the drift is too little for one
+            bias: Some(Measured::from_si(mean(rate), None, display.times_time(0))),
             turn_on_bias: None,
             temperature: None,
             terms: model.terms.iter().map(|t| entry(t, &[None, None], display)).collect::<Result<_, _>>()?,

@@ -65,6 +65,18 @@ pub enum ModelChoice {
     },
 }
 
+impl ModelChoice {
+    /// Why the model can be fitted to no Allan curve and no wavelet variances, if so.
+    pub fn beyond_a_curve(&self) -> Option<String> {
+        let ModelChoice::Terms { kinds, .. } = self else { return None };
+        let kind = kinds.iter().find(|kind| !shape::in_allan_curve(**kind))?;
+        Some(format!(
+            "{} needs --method likelihood: averages of the log do not show it apart from white noise",
+            shape::short_name(*kind)
+        ))
+    }
+}
+
 /// One candidate of the model choice, for the table that is shown.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Candidate {
@@ -201,23 +213,31 @@ pub fn parse_model(text: &str) -> Result<ModelChoice, IdentifyError> {
     let mut kinds = Vec::new();
     let (mut average, mut order) = (None, None);
     for part in text.split('+').map(str::trim) {
-        let samples = (2..=likelihood::LONGEST_AVERAGE).find(|samples| part == format!("ma{samples}"));
-        average = average.or(samples);
-        let poles = (1..=likelihood::MOST_POLES).find(|poles| part == format!("bl{poles}"));
-        order = order.or(poles);
-        let name = if samples.is_some() {
-            "ma"
-        } else if poles.is_some() {
-            "bl"
-        } else {
-            part
+        let name = match part.find(|c: char| c.is_ascii_digit()).map(|at| part.split_at(at)) {
+            Some(("ma", number)) => {
+                let found = (2..=likelihood::LONGEST_AVERAGE).find(|samples| number == samples.to_string());
+                let expected = || format!("'{part}': an average is over 2 to {} samples", likelihood::LONGEST_AVERAGE);
+                average = Some(found.ok_or_else(|| failed(expected()))?);
+                "ma"
+            }
+            Some(("bl", number)) => {
+                let found = (1..=likelihood::MOST_POLES).find(|poles| number == poles.to_string());
+                let expected = || format!("'{part}': a band limit has 1 to {} poles", likelihood::MOST_POLES);
+                order = Some(found.ok_or_else(|| failed(expected()))?);
+                "bl"
+            }
+            _ => part,
         };
         let kind = shape::KINDS
             .into_iter()
             .find(|k| name == shape::short_name(*k) || name == shape::document_name(*k))
             .ok_or_else(|| failed(format!("unknown term '{part}'; known are {} (joined by +), or auto", known())))?;
         if !matches!(kind, Kind::GaussMarkov | Kind::Oscillation) && kinds.contains(&kind) {
-            return Err(failed(format!("'{part}' stands twice; only gm and osc may")));
+            return Err(failed(match kind {
+                Kind::BandLimit => format!("'{part}': a model has one band limit at most"),
+                Kind::MovingAverage => format!("'{part}': a model has one average at most"),
+                _ => format!("'{part}' stands twice; only gm and osc may"),
+            }));
         }
         kinds.push(kind);
     }

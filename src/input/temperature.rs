@@ -63,18 +63,17 @@ impl Table<'_> {
             let other = if time == Some(column) { "time" } else { "an axis" };
             return self.fail(format!("column '{}' is taken both as temperature and as {other}", head.full));
         }
-        let header = head.unit.as_ref().filter(|unit| unit.dimension() == Dimension::TEMPERATURE);
-        let unit = match (header, flag) {
+        let unit = match (&head.unit, flag) {
             (Some(header), Some(flag)) if !same(header, &flag) => {
                 return self.fail(format!(
                     "column '{}' is in {header} by its header, but --temperature says {flag}",
                     head.full
                 ));
             }
-            (Some(unit), _) => unit.clone(),
+            (Some(unit), _) if unit.dimension() == Dimension::TEMPERATURE => unit.clone(),
             (None, Some(flag)) => flag,
-            (None, None) => {
-                let found = match &head.unit {
+            (found, _) => {
+                let found = match found {
                     Some(unit) => format!("is in {unit} by its header, which is no temperature"),
                     None => "has no unit".into(),
                 };

@@ -99,20 +99,28 @@ fn long_form(place: &Place<'_>) -> Result<Measured, KeyError> {
     let value = object.required("value")?.number()?;
     let unit = object.required("unit")?;
     let unit = Unit::parse(unit.text()?).map_err(|e| unit.error(e.to_string()))?;
-    let interval = object.optional("interval").map(|p| interval(&p)).transpose()?;
+    let interval = object.optional("interval").map(|p| interval(&p, value)).transpose()?;
     Ok(Measured { value, unit, interval })
 }
 
-/// `[lower, upper]`; null is an open end.
-fn interval(place: &Place<'_>) -> Result<[f64; 2], KeyError> {
+/// `[lower, upper]` around the value; null is an open end.
+fn interval(place: &Place<'_>, value: f64) -> Result<[f64; 2], KeyError> {
     let ends = place.list()?;
     let [lower, upper] = ends.as_slice() else {
         return Err(place.error(format!("expected [lower, upper], found {} values", ends.len())));
     };
+    let shown = |end: f64| if end.is_finite() { end.to_string() } else { "null".into() };
     let end = |p: &Place<'_>, open: f64| if p.value().is_null() { Ok(open) } else { p.number() };
     let [lower, upper] = [end(lower, f64::NEG_INFINITY)?, end(upper, f64::INFINITY)?];
     if lower > upper {
         return Err(place.error(format!("the lower end {lower} is above the upper end {upper}")));
+    }
+    if !(lower..=upper).contains(&value) {
+        return Err(place.error(format!(
+            "the value {value} is not in [{}, {}]; expected lower <= value <= upper",
+            shown(lower),
+            shown(upper)
+        )));
     }
     Ok([lower, upper])
 }
@@ -143,7 +151,7 @@ impl JsonSchema for Measured {
                         "value": { "type": "number" },
                         "unit": { "type": "string" },
                         "interval": {
-                            "description": "Lower and upper end in the same unit; null is an open end.",
+                            "description": "Lower and upper end in the same unit, the value between them; null is an open end.",
                             "type": "array",
                             "items": { "type": ["number", "null"] },
                             "minItems": 2,

@@ -88,9 +88,9 @@ impl<'a> Place<'a> {
         };
         Ok(values.iter().enumerate().map(|(i, v)| Place { key: format!("{}[{i}]", self.key), value: v }).collect())
     }
-    /// The elements of a list, or the one object that stands for a list of one.
+    /// The elements of a list, or the one object that stands for a list of one; what is neither stands for itself, so that its reader says what it expects.
     pub fn one_or_many(&self) -> Result<Vec<Place<'a>>, KeyError> {
-        if self.value.is_object() { Ok(vec![self.clone()]) } else { self.list() }
+        if self.value.is_array() { self.list() } else { Ok(vec![self.clone()]) }
     }
     pub fn text(&self) -> Result<&'a str, KeyError> {
         self.value.as_str().ok_or_else(|| self.error(format!("expected a text, found {}", describe(self.value))))

@@ -18,6 +18,10 @@ fn temperatures_that_cannot_be_used() {
         ),
         row("identify log.csv --temperature 5", &["'hot (deg)' is in deg by its header, which is no temperature"]),
         row(
+            "identify log.csv --temperature 5:degC",
+            &["'hot (deg)' is in deg by its header, but --temperature says degC"],
+        ),
+        row(
             "identify log.csv --temperature temp_c:degF",
             &["'temp_c' is in degC by its header, but --temperature says degF"],
         ),

@@ -116,6 +116,10 @@ fn the_inflated_parameters() {
         "{note}"
     );
     assert!((axis.factor / 3.0 - 1.0).abs() < 5.0 * 0.0053);
+    let filter = Filter::new(&[1.0], &[1.0, -0.5]).unwrap();
+    let limited = inflated(&params(&[WHITE, Term::BandLimit { density: 0.1, filter }, DRIFT]), &found);
+    let note = limited.source.unwrap().note.unwrap();
+    assert!(note.starts_with("white and band_limit densities multiplied: x "), "{note}");
     // read again and measured again, the factor is one but for the drift, which has 2σ²Tc/(2πfTc)² over 0.02: 1e-3 of the power at 0.5 Hz
     let again = Params::from_json(&out.to_json(), "p").unwrap();
     assert!((inflation(&again, &flight, FROM).unwrap().axes[0].factor - 1.0).abs() < 1e-3);

@@ -97,6 +97,11 @@ fn command_shows_tables_and_refuses_what_it_must() {
         ("identify log.csv --rate 10 -o log.csv", "log.csv: cannot write: it is the input file"),
         ("identify log.csv --rate 10 --report ./log.csv", "it is the input file"),
         ("identify log.csv --rate 10 --model white+x", "unknown term 'x'"),
+        ("identify log.csv --rate 10 --model bl2 --method gmwm", "kfdesign: --model bl2: bl needs --method likelihood"),
+        (
+            "identify log.csv --rate 10 --model white+ma3 --method allan",
+            "kfdesign: --model white+ma3: ma needs --method",
+        ),
         ("identify log.csv --rate 10 --model white+gm --method graphical", "the graphical recipe has one model"),
         ("identify log.csv --rate 10 --end 1 --columns gyro_x", "samples are too few to identify noise"),
     ] {

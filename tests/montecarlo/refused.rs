@@ -168,8 +168,8 @@ fn outputs_that_cannot_be() {
             ("--run 3 -o filter.json", &["filter.json: cannot write: it is the input file"]),
             ("--runs 10 -o no/where.json", &["no/where.json: cannot write: the folder 'no' does not exist"]),
             ("--runs 10 --junit no/where.xml", &["no/where.xml: cannot write: the folder 'no' does not exist"]),
-            ("--runs 10 -o out --junit out", &["out: cannot write: it is the name of two outputs"]),
-            ("--runs 10 -o out.json --junit ./out.json", &["out.json: cannot write: it is the name of two outputs"]),
+            ("--runs 10 -o out --junit out", &["out: named by both -o and --junit; give them"]),
+            ("--runs 10 -o out.json --junit ./out.json", &["out.json: named by both -o and --junit; give them"]),
             ("--runs 10 --resume -o shard.json", &["shard.json: format: found null"]),
         ],
     );

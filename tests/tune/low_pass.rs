@@ -69,3 +69,17 @@ fn a_drift_as_fast_as_the_samples_has_no_bandwidth() {
     assert!(told.contains("up to half the sample rate: the drift estimate follows each sample"), "{told}");
     assert!(!told.contains("follows no drift"), "{told}");
 }
+
+/// Where noise of the measurement has states, R is not all that a sample scatters by.
+#[test]
+fn r_of_a_band_limited_sensor_is_its_white_noise() {
+    let bench = Bench::new();
+    let told = |name: &str| bench.ok(&format!("tune {} --runs 10", data(name).display()));
+    for (name, limited) in [("low_pass/sensor.json", true), ("vibrating.json", true), ("low_pass/density.json", false)]
+    {
+        let text = told(name);
+        let line = text.lines().find(|line| line.starts_with("R ")).unwrap();
+        let words = if limited { "^2: white noise of one sample has sigma" } else { "^2: one sample has sigma" };
+        assert!(line.contains(words), "{name}: {line}");
+    }
+}

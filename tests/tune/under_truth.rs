@@ -197,7 +197,7 @@ fn the_command_shows_the_design_under_a_truth() {
     for part in [
         "wrong/truth.json: root mean square error beside the sigma that the filter claims, exact, no simulation",
         "time (s)     bias  claimed  gauss_markov  claimed  whole drift (deg/s)  claimed    NEES",
-        "Expected NEES per state; expected NIS 0.9996 over 351.8 s: both 1 as claimed.",
+        "Expected NEES per state; expected NIS 0.9996 over 351.8 s: both would be 1 if all were as claimed.",
         "pessimistic: the error of gauss_markov is 0.45",
         "in the end, the error of the whole drift is 0.766",
     ] {

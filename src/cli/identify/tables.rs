@@ -27,12 +27,6 @@ pub(super) fn parameters(axis: &Axis, quantity: Quantity) -> Shown {
         let header = &["parameter", "value", "95 % from", "to", "unit", "also"];
         return Shown { caption: "Parameters with 95 % intervals", header, rows: [bias, rows].concat() };
     }
-    let cells = |own: Option<&Precision>| match own {
-        Some(Precision { std_dev_percent: sd, cramer_rao_percent: bound, .. }) if *sd < 1000.0 => {
-            [digits(*sd), digits(*bound), format!("{:.2}", sd / bound)]
-        }
-        _ => ["-"; 3].map(String::from),
-    };
     let mut precision = found.precision.iter();
     for row in &mut rows {
         row.splice(5..5, cells(precision.next()));
@@ -45,6 +39,19 @@ pub(super) fn parameters(axis: &Axis, quantity: Quantity) -> Shown {
         caption: "Parameters with 95 % intervals, and their standard deviation beside the Cramér-Rao bound of a log like this",
         header: &["parameter", "value", "95 % from", "to", "unit", "sd (%)", "bound (%)", "ratio", "also"],
         rows: bias.chain(rows).collect(),
+    }
+}
+
+/// Standard deviation, its bound and their ratio, as far as there are any.
+fn cells(own: Option<&Precision>) -> [String; 3] {
+    let none = || "-".to_string();
+    match own {
+        Some(Precision { std_dev_percent: sd, cramer_rao_percent: bound, .. }) if *sd < 1000.0 => {
+            let known = bound.is_finite();
+            let [bound, ratio] = [digits(*bound), format!("{:.2}", sd / bound)].map(|cell| known.then_some(cell));
+            [digits(*sd), bound.unwrap_or_else(none), ratio.unwrap_or_else(none)]
+        }
+        _ => [none(), none(), none()],
     }
 }
 
@@ -183,4 +190,20 @@ pub(super) fn candidates(candidates: &[Candidate]) -> Option<Shown> {
             rows,
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bound_without_end_is_a_dash() {
+        let shown = |std_dev_percent: f64, cramer_rao_percent: f64| {
+            cells(Some(&Precision { parameter: String::new(), std_dev_percent, cramer_rao_percent }))
+        };
+        assert_eq!(shown(3.0, 2.0), ["3.000", "2.000", "1.50"]);
+        assert_eq!(shown(3.0, f64::INFINITY), ["3.000", "-", "-"]);
+        assert_eq!(shown(f64::INFINITY, f64::INFINITY), ["-", "-", "-"]);
+        assert_eq!(cells(None), ["-", "-", "-"]);
+    }
 }

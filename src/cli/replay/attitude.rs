@@ -27,7 +27,7 @@ pub(super) struct Flags {
     #[arg(long, value_delimiter = ',', value_name = "COLUMNS")]
     reference: Option<Vec<String>>,
     /// Noise of the reference about each axis, beside one sample of error in its time
-    #[arg(long, default_value = "0.5 deg", value_name = "SIGMA", requires = "reference")]
+    #[arg(long, default_value = "0.5 deg", value_name = "SIGMA", requires = "reference", allow_hyphen_values = true)]
     reference_sigma: String,
     /// Column that is 1 where the body moves: errors count there, rests are elsewhere
     #[arg(long, value_name = "COLUMN")]

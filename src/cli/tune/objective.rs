@@ -20,7 +20,7 @@ pub(super) struct ObjectiveFlags {
     #[arg(long, value_delimiter = ',', value_name = "NAME")]
     pub(super) hold: Vec<String>,
     /// Last share of each log that is not fitted to but foretold (likelihood, compare)
-    #[arg(long, default_value_t = 1.0 / 3.0, value_name = "SHARE")]
+    #[arg(long, default_value_t = 1.0 / 3.0, value_name = "SHARE", allow_negative_numbers = true)]
     pub(super) held_out: f64,
     /// Objective likelihood: the identified intervals do not count
     #[arg(long)]

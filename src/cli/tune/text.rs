@@ -185,6 +185,9 @@ pub(super) fn state_rows(group: &Group<'_>, quantity: Quantity) -> Vec<Vec<Strin
         .collect()
 }
 
+/// States that are noise of the measurement, not drift.
+const NOISE: [&str; 4] = ["quantization", "moving_average", "band_limit", "oscillation"];
+
 /// Label and value of what is said in one line each.
 pub(super) fn facts(group: &Group<'_>, quantity: Quantity) -> Vec<(&'static str, String)> {
     let (model, steady, report) = (&group.design.model, &group.design.steady_state, group.report);
@@ -193,9 +196,17 @@ pub(super) fn facts(group: &Group<'_>, quantity: Quantity) -> Vec<(&'static str,
         let (scale, unit) = shown_unit(&measurement.unit, quantity, &group.unit);
         let root_r = model.r[(i, i)].sqrt() / scale;
         let which = if model.measurements.len() > 1 { format!(" of {}", measurement.name) } else { String::new() };
+        // R is all of a sample's noise only where none of it has states
+        let is_noise =
+            |s: usize| model.h[(i, s)] != 0.0 && NOISE.iter().any(|kind| model.states[s].name.contains(kind));
+        let white = if (0..model.states.len()).any(is_noise) { "white noise of " } else { "" };
         facts.push((
             "R",
-            format!("{} ({unit})^2: one sample{which} has sigma {} {unit}", digits(root_r * root_r), digits(root_r)),
+            format!(
+                "{} ({unit})^2: {white}one sample{which} has sigma {} {unit}",
+                digits(root_r * root_r),
+                digits(root_r)
+            ),
         ));
     }
     if steady.period > 1 {

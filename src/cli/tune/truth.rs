@@ -73,7 +73,11 @@ impl Group<'_> {
         let per =
             if result.states.is_empty() { "of the whole drift (the truth has other states)" } else { "per state" };
         let span = result.time_s.last().copied().unwrap_or(0.0);
-        format!("Expected NEES {per}; expected NIS {} over {} s: both 1 as claimed.", digits(result.nis), digits(span))
+        format!(
+            "Expected NEES {per}; expected NIS {} over {} s: both would be 1 if all were as claimed.",
+            digits(result.nis),
+            digits(span)
+        )
     }
 }
 

@@ -6,10 +6,11 @@ use super::super::shape::{Role, roles};
 use crate::noise::{Filter, HIGHEST_ORDER, Kind, NoiseModel, Term};
 
 /// White noise beside a band limit whose shape is searched, variance over that of its innovations. An ARMA(p, p) process holds any white noise in itself, so that
-/// none of its own can be told; a filter needs some measurement noise. So little, since nothing is left at half the sample rate of what no converter has followed.
+/// none of its own can be told; a filter needs some measurement noise. Little, since nothing is left at half the sample rate of what no converter has followed; but not so
+/// little beside the samples, [`LEAST`] of white noise of the same density, that the first update of a covariance loses its digits, and at most [`LARGEST_FLOOR`].
 const FLOOR: f64 = 1e-9;
-/// White noise beside a band limit that is such a floor, at most.
-const LARGEST_FLOOR: f64 = 1.001e-5;
+const LEAST: f64 = 1e-8;
+const LARGEST_FLOOR: f64 = 1e-5;
 
 /// Density, and the area ratios of poles and zeros.
 const BAND_LIMIT: [Role; 2 * HIGHEST_ORDER + 1] = {
@@ -84,7 +85,9 @@ impl Piece {
     pub(super) fn floor(self, values: &[f64]) -> Option<Term> {
         match (self, self.term(values)?) {
             (Piece::BandLimit(_), Term::BandLimit { density, filter }) => {
-                Some(Term::White { density: density * (FLOOR * filter.innovation()).sqrt() })
+                let innovation = filter.innovation();
+                let floor = (FLOOR * innovation).max(LEAST.min(LARGEST_FLOOR * innovation));
+                Some(Term::White { density: density * floor.sqrt() })
             }
             _ => None,
         }
@@ -136,7 +139,7 @@ impl Form {
 
     /// Of a model, with its logarithms; the slope of a ramp is none of them.
     pub(super) fn of(model: &NoiseModel) -> (Form, Vec<f64>) {
-        Form::with_floor(model, LARGEST_FLOOR)
+        Form::with_floor(model, 1.001 * LARGEST_FLOOR)
     }
 
     /// The same, where white noise beside a band limit is a floor up to this share of its innovations.

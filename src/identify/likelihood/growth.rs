@@ -119,7 +119,27 @@ pub(super) fn grow(data: &Ordinates) -> Visited {
     } else if let Some(limited) = limited.filter(|limited| score(limited, data) < score(&best, data)) {
         grown(data, &mut visited, limited, FIRST_ORDERS);
     }
+    // lines may have come where the shape of the band limit was not right yet
+    let best = visited.ranked(data)[0].clone();
+    if let Some(bare) = without_lines(data, &best) {
+        visited.keep(bare.clone());
+        if score(&bare, data) < score(&best, data) {
+            grown(data, &mut visited, bare, FIRST_ORDERS);
+        }
+    }
     visited
+}
+
+/// The best of the same drift beside a band limit of this order, or one more or less, and no lines, each from many starts; `None` where there are no lines beside a band limit.
+fn without_lines(data: &Ordinates, fit: &Fit) -> Option<Fit> {
+    let pieces = fit.form.pieces();
+    let of = |piece: &Piece| if let Piece::BandLimit(order) = piece { Some(*order) } else { None };
+    let order = pieces.iter().find_map(of).filter(|_| fit.form.has(Kind::Oscillation))?;
+    let drift = pieces.iter().filter(|piece| !matches!(piece.kind(), Kind::BandLimit | Kind::Oscillation));
+    let with = |order: u8| Form::new(drift.clone().copied().chain([Piece::BandLimit(order)]).collect());
+    let forms: Vec<Form> = (order.saturating_sub(1).max(1)..=(order + 1).min(MOST_POLES)).map(with).collect();
+    let found: Vec<Fit> = forms.par_iter().filter_map(|form| self::fit(data, form)).collect();
+    found.into_iter().min_by(|a, b| score(a, data).total_cmp(&score(b, data)))
 }
 
 /// By rounds of additions and rearrangements, until none is better; `orders`: of a band limit that may be added.

@@ -18,6 +18,8 @@ const TONE: f64 = 0.98;
 /// A bin is halved while its halves, or its middle and its ends, differ in power by more than this in ln, and by more than so many standard deviations.
 const LEVEL: f64 = 0.1;
 const SURE: f64 = 2.0;
+/// Share of the power within [`ALONE`] coefficients of the largest, in a log that is mostly a tone.
+const LOUD: f64 = 0.5;
 /// A line's surroundings are binned this finely: each bin is at most this share of its distance from the line.
 const LINE_WIDTH: f64 = 0.25;
 
@@ -57,23 +59,35 @@ pub(super) struct Ordinates {
 
 impl Ordinates {
     /// `x`: consecutive samples; `lines`: as found elsewhere, or looked for.
-    ///
-    /// Coefficients of a ramp of slope 1: r_j = −√(2/n) dt cos(πj/2n)/(2 sin²(πj/2n)) for odd j, else 0 (summation by parts).
     pub(super) fn new(x: &[f64], dt: f64, lines: Option<&[Line]>) -> Ordinates {
-        Ordinates::in_bins(x, dt, lines, |_, layout| layout)
+        let coefficients = coefficients(x, dt);
+        let step = step(&coefficients, dt);
+        let lines = lines.map_or_else(|| find_lines(&squares(&coefficients), step, 1.0), <[Line]>::to_vec);
+        let layout = layout(coefficients.len(), step, &lines);
+        Ordinates::gathered(&coefficients, dt, layout, lines)
     }
 
-    /// `bins`: of the coefficients and the bins that lines ask for.
-    fn in_bins(x: &[f64], dt: f64, lines: Option<&[Line]>, bins: impl FnOnce(&[f64], Layout) -> Layout) -> Ordinates {
-        let n = x.len();
-        let mut coefficients = cosine_transform(x);
-        let root = dt.sqrt();
-        coefficients.iter_mut().for_each(|c| *c *= root);
-        let step = 1.0 / (2.0 * n as f64 * dt);
-        let lines = match lines {
-            Some(lines) => lines.to_vec(),
-            None => find_lines(&coefficients.iter().map(|c| c * c).collect::<Vec<_>>(), step, 1.0),
-        };
+    /// Stretches of one length, with the lines that stand out of any of them, in bins as fine as all together ask for; `None` of none.
+    pub(super) fn of_several(rates: &[&[f64]], dt: f64) -> Option<Ordinates> {
+        let each: Vec<Vec<f64>> = rates.par_iter().map(|rate| coefficients(rate, dt)).collect();
+        let step = step(each.first()?, dt);
+        let mut lines: Vec<Line> = each.par_iter().flat_map(|own| find_lines(&squares(own), step, 1.0)).collect();
+        lines.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+        if each.len() > 1 {
+            lines.dedup_by(|b, a| b.frequency_hz - a.frequency_hz < a.width_hz.max(b.width_hz));
+        }
+        let (first, others) = each.split_first()?;
+        let mut power = squares(first);
+        others.iter().for_each(|own| power.iter_mut().zip(own).for_each(|(sum, c)| *sum += c * c));
+        let layout = halved(&power, each.len(), layout(power.len(), step, &lines));
+        let gathered = |own: &Vec<f64>| Ordinates::gathered(own, dt, layout.clone(), lines.clone());
+        Ordinates::pooled(&each.par_iter().map(gathered).collect::<Vec<_>>())
+    }
+
+    /// Coefficients of a ramp of slope 1: r_j = −√(2/n) dt cos(πj/2n)/(2 sin²(πj/2n)) for odd j, else 0 (summation by parts).
+    fn gathered(coefficients: &[f64], dt: f64, layout: Layout, lines: Vec<Line>) -> Ordinates {
+        let n = coefficients.len() + 1;
+        let (root, step) = (dt.sqrt(), step(coefficients, dt));
         let angles = Roots::new(4 * n);
         let scale = -root * dt * (2.0 / n as f64).sqrt();
         let bin = |(first, size): (usize, usize)| {
@@ -89,34 +103,9 @@ impl Ordinates {
             let power = own.iter().map(|c| c * c).sum();
             Bin { frequency_hz: middle(first, size) * step, count: size as f64, power, with_ramp, ramp }
         };
-        let layout = bins(&coefficients, layout(coefficients.len(), step, &lines));
         let bins: Vec<Bin> = layout.into_par_iter().map(bin).collect();
         let grid = Grid::new(bins.iter().map(|bin: &Bin| bin.frequency_hz).collect(), dt);
         Ordinates { bins, grid, lines, samples: n, windows: 1.0, dt }
-    }
-
-    /// Stretches of one length, with the lines that stand out of any of them; `None` of none.
-    pub(super) fn of_several(rates: &[&[f64]], dt: f64) -> Option<Ordinates> {
-        let fine = |coefficients: &[f64], layout: Layout| halved(coefficients, layout);
-        if let [rate] = rates {
-            return Some(Ordinates::in_bins(rate, dt, None, fine));
-        }
-        let alone: Vec<Ordinates> = rates.par_iter().map(|rate| Ordinates::new(rate, dt, None)).collect();
-        let mut lines: Vec<Line> = alone.iter().flat_map(|own| own.lines.iter().copied()).collect();
-        lines.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
-        lines.dedup_by(|b, a| b.frequency_hz - a.frequency_hz < a.width_hz.max(b.width_hz));
-        // all in the bins that the first asks for
-        let first = Ordinates::in_bins(rates.first()?, dt, Some(&lines), fine);
-        let sizes: Vec<usize> = first.bins.iter().map(|bin| bin.count as usize).collect();
-        let same = |_: &[f64], _: Layout| {
-            let place = |next: &mut usize, size: &usize| {
-                *next += size;
-                Some((*next - size, *size))
-            };
-            sizes.iter().scan(0, place).collect()
-        };
-        let others = rates[1..].par_iter().map(|rate| Ordinates::in_bins(rate, dt, Some(&lines), same));
-        Ordinates::pooled(&[vec![first], others.collect()].concat())
     }
 
     /// Windows of the same length and lines taken together; `None` of none.
@@ -205,24 +194,52 @@ impl Ordinates {
 /// How many coefficients come before each bin, and how many are in it.
 type Layout = Vec<(usize, usize)>;
 
-/// The bins, halved where the spectrum changes within them: at the zeros of an average, on the skirts of a filter.
-fn halved(coefficients: &[f64], layout: Layout) -> Layout {
+/// Cosine coefficients 1, 2 … of consecutive samples, times √dt.
+fn coefficients(x: &[f64], dt: f64) -> Vec<f64> {
+    let mut all = cosine_transform(x);
+    let root = dt.sqrt();
+    all.iter_mut().for_each(|c| *c *= root);
+    all
+}
+
+fn squares(coefficients: &[f64]) -> Vec<f64> {
+    coefficients.iter().map(|c| c * c).collect()
+}
+
+/// Hz between coefficients.
+fn step(coefficients: &[f64], dt: f64) -> f64 {
+    1.0 / (2.0 * (coefficients.len() + 1) as f64 * dt)
+}
+
+/// The bins, halved where the spectrum changes within them: at the zeros of an average, on the skirts of a filter. Not those about lines, which are fine enough, and none beside a tone that is most
+/// of the log: the skirts that it has are of the ends of the log, and no process. `power`: of each coefficient, of so many logs together.
+fn halved(power: &[f64], logs: usize, layout: Layout) -> Layout {
+    let all: f64 = power.iter().sum();
+    let peak = (0..power.len()).max_by(|i, j| power[*i].total_cmp(&power[*j])).unwrap_or(0);
+    let near = peak.saturating_sub(ALONE)..(peak + ALONE).min(power.len());
+    if peak > ALONE && power[near].iter().sum::<f64>() > LOUD * all {
+        return layout;
+    }
     let mut done = Layout::new();
-    let mut left: Layout = layout.into_iter().rev().collect();
-    while let Some((first, size)) = left.pop() {
-        let quarter = size / 4;
-        let power = |part: usize| {
-            let start = first + part * quarter;
-            coefficients[start..start + quarter].iter().map(|c| c * c).sum::<f64>()
-        };
-        let [a, b, c, d] = [0, 1, 2, 3].map(power);
-        // each side has 2 · quarter coefficients, the logarithm of its power a variance of 1/quarter
-        let far = |ratio: f64| ratio.ln().abs() > LEVEL.max(SURE * (2.0 / quarter as f64).sqrt());
-        if quarter > 1 && (far((a + b) / (c + d)) || far((a + d) / (b + c))) {
-            let half = size / 2;
-            left.extend([(first + half, size - half), (first, half)]);
-        } else {
+    for (first, size) in layout {
+        if size < width(first + 1, 1.0, &[]) {
             done.push((first, size));
+            continue;
+        }
+        let mut left = vec![(first, size)];
+        while let Some((first, size)) = left.pop() {
+            let quarter = size / 4;
+            let of = |part: usize| power[first + part * quarter..first + (part + 1) * quarter].iter().sum::<f64>();
+            let [a, b, c, d] = [0, 1, 2, 3].map(of);
+            // each side has 2 · quarter coefficients of every log, the logarithm of its power a variance of 1/(quarter · logs)
+            let limit = LEVEL.max(SURE * (2.0 / (quarter * logs) as f64).sqrt());
+            let far = |ratio: f64| ratio.ln().abs() > limit;
+            if quarter > 1 && (far((a + b) / (c + d)) || far((a + d) / (b + c))) {
+                let half = size / 2;
+                left.extend([(first + half, size - half), (first, half)]);
+            } else {
+                done.push((first, size));
+            }
         }
     }
     done

@@ -23,7 +23,7 @@ fn increments_are_no_rates() {
     let params = crate::support::data("params.json").display().to_string();
     for kind in ["increments", "angle"] {
         for command in [
-            format!("replay filter.json log.csv --unit rad"),
+            "replay filter.json log.csv --unit rad".to_string(),
             format!("tune {params} --objective likelihood --log log.csv -o f.json"),
         ] {
             let out = bench.run(&format!("{command} --input {kind}"));

@@ -58,7 +58,7 @@ pub enum SensorArg {
 }
 
 impl LogFlags {
-    /// The same for what reads sample by sample, and knows rates alone.
+    /// As [`LogFlags::options`], for what reads sample by sample and knows rates alone.
     pub fn rates(&self) -> anyhow::Result<LogOptions> {
         let flag = match self.input {
             InputArg::Rate => return self.options(),

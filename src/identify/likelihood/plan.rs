@@ -21,7 +21,7 @@ use crate::signal::lines::Line;
 pub const LONGEST_S: f64 = 10.0 * 365.25 * 86_400.0;
 
 /// White noise beside a band limit of at most this share of the variance of its innovations is not told from it.
-const FLOOR: f64 = 0.05;
+const UNTOLD: f64 = 0.05;
 /// Zeros on the unit circle, where a search does not come to, are moved in to this.
 const LARGEST_ZERO: f64 = 0.98;
 /// What is thought of the logarithm of an area ratio beforehand, one over its variance: nothing that matters where the log tells it, and the rest stays finite
@@ -84,7 +84,7 @@ impl Planned {
             }
             other => other,
         };
-        let (form, logs) = Form::with_floor(&NoiseModel { terms: model.terms.iter().map(within).collect() }, FLOOR);
+        let (form, logs) = Form::with_floor(&NoiseModel { terms: model.terms.iter().map(within).collect() }, UNTOLD);
         let known: Vec<String> = (0..logs.len()).map(|i| name_of(&form, i)).collect();
         // none of the white noise that only goes with a band limit
         let place = |name: &str| known.iter().position(|known| known == name);

@@ -10,7 +10,7 @@ mod windows;
 use std::time::Instant;
 
 use kfdesign::identify::{Identified, Method, ModelChoice, identify_axis, parse_model};
-use kfdesign::noise::{NoiseModel, Term};
+use kfdesign::noise::{Filter, NoiseModel, Term};
 use kfdesign::numerics::random::{StreamId, stream};
 use kfdesign::params::TermEntry;
 use kfdesign::units::Unit;
@@ -340,20 +340,48 @@ fn a_poor_fit_by_chance_leaves_no_short_averages_out() {
 }
 
 /// A sensor whose samples are averaged in pairs (lag-one correlation 1/2): the shortest averaging times are left out, and the
-/// density stays right. |z| < 6 and the p-value as above.
+/// density stays right. |z| < 4.5, of one that is a quarter of its standard deviation low, and the p-value as above.
 #[test]
 fn band_limited_log_loses_its_shortest_averaging_times_only() {
     let raw = log(&[white(N)], 200_001, 0.01, 7, 0);
     let rate: Vec<f64> = raw.windows(2).map(|w| 0.5 * (w[0] + w[1])).collect();
     let found = identify(&rate, 0.01, &ModelChoice::Auto);
     let first = found.first_tau_s.unwrap();
-    assert!(first > 0.05 && first <= 1.0, "{first}");
+    assert!(first > 0.05 && first <= 2.0, "{first}");
     assert!(found.fit_p_value >= 0.001, "{}", found.fit_p_value);
     assert!(found.warnings.iter().any(|w| w.contains("band-limited")), "{:?}", found.warnings);
     let [[lower, upper], ..] = intervals(&found);
     let z = (logs(&found.model)[0] - N.ln()) / ((upper / lower).ln() / (2.0 * 1.96));
-    assert!(z.abs() < 6.0, "{z}");
-    assert!(upper / lower < 1.1);
+    assert!(z.abs() < 4.5, "{z}");
+    assert!(upper / lower < 1.15);
+}
+
+/// 24 logs behind a filter (half of them means of two, half a low-pass of order 2 at a tenth of the rate), by the curve and by its wavelets: the 95 % interval of N
+/// holds the truth in at least 17. If it covers 92 %, fewer come with a probability of 3e-5. Without a margin beyond the time where the filter is seen, it is 1 and 8.
+#[test]
+fn density_behind_a_filter_is_in_its_interval() {
+    // scipy.signal.butter(2, 0.2)
+    let low_pass = Filter::new(
+        &[0.067_455_273_889_071_89, 0.134_910_547_778_143_77, 0.067_455_273_889_071_89],
+        &[1.0, -1.142_980_502_539_901_1, 0.412_801_598_096_188_77],
+    )
+    .unwrap();
+    let filtered = [Term::MovingAverage { density: N, samples: 2 }, Term::BandLimit { density: N, filter: low_pass }];
+    for method in [Method::Allan, Method::Gmwm] {
+        let held = |run: u64| {
+            let terms = [white(1e-3 * N), filtered[run as usize % 2], gauss_markov(SIGMA, 0.1 * TC)];
+            let rate = log(&terms, 120_000, 0.01, 71, run);
+            let unit = Unit::parse("rad/s").unwrap();
+            let found = identify_axis("x", &rate, 0.01, &unit, method, &ModelChoice::Auto).unwrap();
+            let white = found.params.terms.iter().find_map(|term| match term {
+                TermEntry::White { density } => density.interval_si(),
+                _ => None,
+            });
+            white.is_some_and(|[lower, upper]| lower <= N && N <= upper)
+        };
+        let count = (0..24_u64).into_par_iter().filter(|run| held(*run)).count();
+        assert!(count >= 17, "{method:?}: {count}");
+    }
 }
 
 // ---------------------------------------------------------------------------------------------------------------

@@ -320,13 +320,13 @@ impl Words<'_> {
             let expected = fit.model().allan_variance(shortest.m, curve.dt).sqrt();
             let percent = 100.0 * (shortest.deviation / expected - 1.0);
             let why = if percent < 0.0 {
-                "the log is band-limited there (filter of the sensor)"
+                "the log is band-limited (filter of the sensor)"
             } else {
-                "vibration, aliasing or quantisation show there"
+                "vibration, aliasing or quantisation show"
             };
             warnings.push(format!(
-                "averaging times below {} s left out: {why}; the deviation of single samples is {:+.0} % off the model, so \
-                 neighbouring innovations of a filter at this rate will not be white",
+                "averaging times below {} s left out: {why}, and N of shorter times would feel it; the deviation of single samples is {:+.0} % off the model, so \
+                 neighbouring innovations of a filter at this rate will not be white (--method likelihood looks for filters and lines)",
                 digits(first),
                 percent
             ));

@@ -22,8 +22,12 @@ const LEAVING_OUT_LEVEL: f64 = 1e-4;
 const MOST_GAUSS_MARKOV: usize = 2;
 /// Short averaging times may be left out up to this many samples …
 const LEFT_OUT_FACTOR: u64 = 100;
-/// … as long as this many points remain.
-const REMAINING_POINTS: usize = 10;
+/// … as long as this range of times remains: ten points of five a decade, seven octaves.
+const REMAINING_RANGE: u64 = 62;
+/// Times below this many times the first at which the departure is no longer seen are left out too. Of autocovariances γ_k that end, the Allan variance of m
+/// samples, (S − 3/(2m) Σ|k|γ_k)/m with S = Σγ_k, keeps a part that fades as 1/m; where it is just not seen it is some standard deviations of N, at eight times
+/// m, where N is known √8 times worse, 1/23 of that.
+const MARGIN: u64 = 8;
 
 /// All models that were fitted to the same points.
 #[derive(Clone, Debug)]
@@ -101,9 +105,8 @@ fn neighbours(shape: &Shape) -> Vec<Shape> {
 
 /// Fit the forced model, or grow one, to the points; if that does not explain the curve (p below 10⁻⁴), try without the shortest averaging times.
 ///
-/// The rule: only averaging factors up to 100 samples may be left out (anti-alias filters and vibration act there), at least
-/// ten points must remain. A model is found on the points beyond; the shorter ones are then taken in, longest first, as long
-/// as the fit keeps a p-value of 0.001. If no model explains even the long averaging times, nothing is left out, unless the
+/// The rule: only averaging factors up to 100 samples may be left out (anti-alias filters and vibration act there), [`REMAINING_RANGE`] must remain. A model is found on the points beyond; the shorter ones are then taken in, longest first, as long
+/// as the fit keeps a p-value of 0.001, and the model is found on those beyond [`MARGIN`] times the shortest of them (if there are enough of these and it explains them). If no model explains even the long averaging times, nothing is left out, unless the
 /// misfit √(χ²/dof) more than halves by it.
 pub(super) fn search(points: &Points, forced: Option<&Shape>) -> Table {
     let find = |points: &Points| match forced {
@@ -118,21 +121,26 @@ pub(super) fn search(points: &Points, forced: Option<&Shape>) -> Table {
     if full.best().is_some_and(|fit| fit.p_value() >= LEAVING_OUT_LEVEL) {
         return full;
     }
-    let firsts: Vec<u64> = points
-        .factors()
-        .iter()
-        .enumerate()
-        .skip(1)
-        .filter(|(i, m)| **m <= LEFT_OUT_FACTOR && points.len() - i >= REMAINING_POINTS)
-        .map(|(_, m)| *m)
-        .collect();
+    let factors = points.factors();
+    let remain = |m: u64| factors.last().is_some_and(|longest| *longest >= REMAINING_RANGE * m);
+    let firsts: Vec<u64> = factors.iter().skip(1).copied().filter(|m| *m <= LEFT_OUT_FACTOR && remain(*m)).collect();
     let Some(last) = firsts.last() else { return full };
+    let beyond = |first: &u64| {
+        let start = factors.iter().find(|m| **m >= MARGIN * first).filter(|m| remain(**m))?;
+        Some(find(&points.starting_at(*start))).filter(Table::explains)
+    };
     let safe = find(&points.starting_at(*last));
     let Some(best) = safe.best().filter(|_| safe.explains()) else {
-        return if 2.0 * safe.misfit() < full.misfit() { safe } else { full };
+        return beyond(last).unwrap_or(if 2.0 * safe.misfit() < full.misfit() { safe } else { full });
     };
     let kept = |first: &&u64| fit(&points.starting_at(**first), &best.shape).is_some_and(|f| f.p_value() >= FIT_LEVEL);
-    let Some(first) = firsts.iter().rev().skip(1).take_while(kept).last() else { return safe };
+    let first = firsts.iter().rev().skip(1).take_while(kept).last().unwrap_or(last);
+    if let Some(far) = beyond(first) {
+        return far;
+    }
+    if first == last {
+        return safe;
+    }
     let mut table = find(&points.starting_at(*first));
     table.add([best.shape.clone()]);
     if table.explains() { table } else { safe }

@@ -7,6 +7,8 @@ use anyhow::bail;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
+use crate::params::{AxisParams, Params};
+use crate::replay::axes::RATE_TOLERANCE;
 pub use crate::units::digits;
 use crate::units::{Quantity, Unit};
 
@@ -88,6 +90,24 @@ pub fn notes<'a>(said: impl Iterator<Item = (&'a str, &'a [String])>) -> String 
         }
     }
     found.iter().map(|(sentence, names)| format!("note: {}: {sentence}\n", names.join(", "))).collect()
+}
+
+/// What a rate other than that of the parameters makes of the terms that count samples, "x, y: …", each sentence once.
+pub fn notes_of_rate(params: &Params, axes: &[&AxisParams], rate_hz: f64) -> String {
+    if (rate_hz / params.sample_rate_hz - 1.0).abs() <= RATE_TOLERANCE {
+        return String::new();
+    }
+    let sentence = |axis: &AxisParams| {
+        let counted = axis.noise().of_samples()?;
+        Some(format!(
+            "{counted} belongs to the samples at {} Hz: at {} Hz the same coefficients are another process (the corner of a filter moves with the rate)",
+            digits(params.sample_rate_hz),
+            digits(rate_hz)
+        ))
+    };
+    let said: Vec<(&str, Vec<String>)> =
+        axes.iter().map(|axis| (axis.name.as_str(), sentence(axis).into_iter().collect())).collect();
+    notes(said.iter().map(|(name, sentences)| (*name, sentences.as_slice())))
 }
 
 /// A text table: first column left, the others right aligned, two spaces between.

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::Status;
-use super::output::{digits, duration, print_json, print_text, table};
+use super::output::{digits, duration, notes_of_rate, print_json, print_text, table};
 use crate::export::atomic;
 use crate::identify::plan::{LONGEST_S, Planned, Sampling, Thinning};
 use crate::noise::NoiseModel;
@@ -125,6 +125,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
             .check_rate(1.0 / rate_hz)
             .with_context(|| format!("{}: axis {}", args.params.display(), axis.name))?;
     }
+    eprint!("{}", notes_of_rate(&params, &chosen, rate_hz));
     // axes alike are planned once
     let mut unlike: Vec<&AxisParams> = Vec::new();
     for axis in &chosen {
@@ -214,7 +215,8 @@ fn plan(axis: &AxisParams, parameter: &str, precision: f64, rate_hz: f64) -> any
             ratio: needed.zip(duration_s).map(|(needed, own)| needed / own),
         }
     };
-    let rates = if duration_s.is_some() { rates(&own, &row) } else { vec![] };
+    let faster = model.of_samples().is_none();
+    let rates = if duration_s.is_some() { rates(&own, &row, faster) } else { vec![] };
     let recommended = duration_s.map(|_| recommended(&own, &row));
     let at = |span_s: f64| planned.precision(span_s, &own);
     let after: Vec<f64> = duration_s.map(&at).unwrap_or_default();
@@ -242,10 +244,11 @@ fn plan(axis: &AxisParams, parameter: &str, precision: f64, rate_hz: f64) -> any
     })
 }
 
-/// Ten times the rate, the rate itself, a tenth, … until averages ask for a log twice as long.
-fn rates(own: &Sampling, row: &impl Fn(&Sampling, bool) -> Rate) -> Vec<Rate> {
-    let faster = Sampling { sensor_rate_hz: 10.0 * own.sensor_rate_hz, ..*own };
-    let mut rates = vec![row(&faster, true), row(own, true)];
+/// Ten times the rate (if no term counts samples), the rate itself, a tenth, … until averages ask for a log twice as long.
+fn rates(own: &Sampling, row: &impl Fn(&Sampling, bool) -> Rate, faster: bool) -> Vec<Rate> {
+    let ten_times = Sampling { sensor_rate_hz: 10.0 * own.sensor_rate_hz, ..*own };
+    let of_the_sensor = if faster { vec![ten_times, *own] } else { vec![*own] };
+    let mut rates: Vec<Rate> = of_the_sensor.iter().map(|sampling| row(sampling, true)).collect();
     let mut every = 10;
     while every <= MOST {
         let averages = row(&Sampling { every, ..*own }, false);

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::Status;
 use super::flags::{whole, with_unit};
-use super::output::{digits, print_json, print_text, progress, shown_unit, table};
+use super::output::{digits, notes_of_rate, print_json, print_text, progress, shown_unit, table};
 use super::tune::plant_flags::PlantFlags;
 use crate::export::atomic;
 use crate::export::table::TableWriter;
@@ -103,6 +103,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let params = Params::read(&args.params)?;
     atomic::refuse_input_as_output(&args.output, &args.params)?;
     let scenario = scenario(args, &params)?;
+    eprint!("{}", notes_of_rate(&params, &params.axes.iter().collect::<Vec<_>>(), scenario.rate_hz));
     let unit = match &args.unit {
         None => display_unit(&params)?,
         Some(text) => {

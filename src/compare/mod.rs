@@ -280,23 +280,11 @@ fn other_rate(params_hz: f64, log_hz: f64, model: &NoiseModel) -> Option<String>
     if (log_hz / params_hz - 1.0).abs() <= RATE_TOLERANCE {
         return None;
     }
-    let counted: Vec<String> = model
-        .terms
-        .iter()
-        .filter_map(|term| match term {
-            Term::MovingAverage { samples, .. } => Some(format!("moving_average over {samples} samples")),
-            Term::BandLimit { .. } => Some("band_limit".into()),
-            Term::Quantization { .. } => Some("quantization".into()),
-            _ => None,
-        })
-        .collect();
-    let consequence = if counted.is_empty() {
-        "every term is continuous and is sampled at the log's rate".into()
-    } else {
-        format!(
-            "{} belongs to the samples and is another process at another rate: differences at high frequencies may come from that",
-            counted.join(" and ")
-        )
+    let consequence = match model.of_samples() {
+        None => "every term is continuous and is sampled at the log's rate".into(),
+        Some(counted) => format!(
+            "{counted} belongs to the samples and is another process at another rate: differences at high frequencies may come from that"
+        ),
     };
     Some(format!("the parameters are for {} Hz, the log has {} Hz: {consequence}", digits(params_hz), digits(log_hz)))
 }

@@ -296,6 +296,21 @@ impl NoiseModel {
         });
         fast.map_or(Ok(()), |frequency_hz| Err(TooFast { frequency_hz, dt }))
     }
+    /// The terms that count samples, "moving_average over 2 samples and quantization": at another sample rate each is another process, and all others are the
+    /// same. None if there is none.
+    pub fn of_samples(&self) -> Option<String> {
+        let counted: Vec<String> = self
+            .terms
+            .iter()
+            .filter_map(|term| match term {
+                Term::MovingAverage { samples, .. } => Some(format!("moving_average over {samples} samples")),
+                Term::BandLimit { .. } => Some("band_limit".into()),
+                Term::Quantization { .. } => Some("quantization".into()),
+                _ => None,
+            })
+            .collect();
+        (!counted.is_empty()).then(|| counted.join(" and "))
+    }
     pub fn psd(&self, f_hz: f64, dt: f64) -> f64 {
         self.terms.iter().map(|t| t.psd(f_hz, dt)).sum()
     }

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
 
 use super::{gauss_markov, log, white};
-use crate::support::{Bench, data};
+use crate::support::{Bench, Outcome, data};
 
 /// The reference sensor, to all digits (deg/s, s).
 const N: f64 = 0.0562;
@@ -294,4 +294,28 @@ fn command() {
     assert_eq!((never.status, json["axes"][0]["duration_s"].is_null()), (1, true), "{json}");
     let said = bench.run(&format!("{plan} 0.01%"));
     assert!(said.stdout.contains("no log is long enough; ten years at 100.0 Hz give 0.1"), "{}", said.stdout);
+}
+
+/// A band limit belongs to its sample rate: another rate is told, on stderr, and no row of ten times the rate is made of it; continuous terms are told nothing.
+#[test]
+fn another_rate_moves_a_filter_and_is_told() {
+    let bench = Bench::new();
+    std::fs::copy(data("params.json"), bench.path("params.json")).unwrap();
+    std::fs::copy(data("low_pass/sensor.json"), bench.path("sensor.json")).unwrap();
+    let note = "note: gyro_x: band_limit belongs to the samples at 200.0 Hz: at 50.00 Hz the same coefficients are another process";
+    let wish = "--parameter gauss_markov.correlation_time --precision 10%";
+    let moved = [
+        bench.run("simulate sensor.json -o log.npy --duration 10s --rate 50"),
+        bench.run(&format!("plan sensor.json {wish} --rate 50")),
+    ];
+    let kept = [
+        bench.run("simulate sensor.json -o log.npy --duration 10s --rate 200"),
+        bench.run(&format!("plan sensor.json {wish}")),
+        bench.run("simulate params.json -o log.npy --duration 10s --rate 50"),
+        bench.run(&format!("plan params.json {wish} --rate 50")),
+    ];
+    assert!(moved.iter().all(|run| run.status == 0 && run.stderr.matches(note).count() == 1), "{moved:?}");
+    assert!(kept.iter().all(|run| run.status == 0 && !run.stderr.contains("note")), "{kept:?}");
+    let faster = |run: &Outcome| run.stdout.matches("of the sensor").count();
+    assert_eq!([faster(&moved[1]), faster(&kept[1]), faster(&kept[3])], [1, 1, 2]);
 }

@@ -48,7 +48,7 @@ fn words(text: &str) -> String {
 fn help_names_what_a_model_may_have_and_what_is_followed() {
     let bench = Bench::new();
     let help = words(&bench.ok("identify --help"));
-    assert!(help.contains("ma2 … ma16") && help.contains("bl1 … bl6"), "{help}");
+    assert!(help.contains("ma2 … ma64") && help.contains("bl1 … bl6"), "{help}");
     let help = words(&bench.ok("replay --help"));
     assert!(help.contains("band limit, quantization, lines, Gauss-Markov processes of a few samples"), "{help}");
 }

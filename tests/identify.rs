@@ -545,8 +545,8 @@ fn model_names() {
         ("bl2+bl3", "'bl3': a model has one band limit at most"),
         ("bl7", "'bl7': a band limit has 1 to 6 poles"),
         ("bl0", "'bl0': a band limit has 1 to 6 poles"),
-        ("white+ma99", "'ma99': an average is over 2 to 16 samples"),
-        ("white+ma1", "'ma1': an average is over 2 to 16 samples"),
+        ("white+ma99", "'ma99': an average is over 2 to 64 samples"),
+        ("white+ma1", "'ma1': an average is over 2 to 64 samples"),
         ("", "unknown term ''"),
     ] {
         let error = parse_model(bad).unwrap_err().to_string();

@@ -49,7 +49,7 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = MethodArg::Likelihood)]
     method: MethodArg,
     /// Terms of the model: auto, or white+gm, white+rrw … (terms: white, gm (up to three), rrw, flicker, quantization, ramp; for likelihood
-    /// also osc, ma (ma2 … ma16: an average over so many samples) and, in the place of white, bl (bl1 … bl6: a band limit of so many poles))
+    /// also osc, ma (ma2 … ma64: an average over so many samples) and, in the place of white, bl (bl1 … bl6: a band limit of so many poles))
     #[arg(long, value_name = "MODEL", default_value = "auto")]
     model: String,
     /// Read the log in windows of this length and multiply their likelihoods, for logs too long for memory: 24h, 30min

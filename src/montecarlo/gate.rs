@@ -8,7 +8,7 @@
 
 use std::fmt;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::course::{AxisCourse, Channel};
 use crate::consistency::normalized::two_sided_p;
@@ -16,6 +16,10 @@ use crate::numerics::distribution::{chi_square_sf, kolmogorov_sf, normal_quantil
 use crate::numerics::linalg::symmetric_eigenvalues;
 use crate::numerics::quadratic_form::QuadraticForm;
 
+/// Of so many judged components all are looked at together.
+const SMALL: usize = 6;
+/// Correlation that counts as none: the mean of the sum is exact, its variance off by at most the square.
+const UNKNOWN: f64 = 1e-5;
 /// Below this many drawn values the tail is extrapolated.
 const FEWEST: usize = 50;
 
@@ -208,17 +212,74 @@ pub(super) fn nees_over_time(axis: &AxisCourse) -> QuadraticForm {
     // evenly spread epochs follow those of the start
     let first = axis.epochs.iter().position(|epoch| epoch.regular).unwrap_or(axis.epochs.len());
     let count = axis.epochs.len() - first;
-    let mut correlation = DMatrix::identity(count * size, count * size);
+    let mut below: Vec<Vec<DMatrix<f64>>> = Vec::with_capacity(count);
     for k in 0..count {
         let mut cross = &axis.gains.epochs[first + k].covariance * axis.epochs[first + k].of_estimate.transpose();
-        for j in k + 1..count {
-            cross = &axis.gains.epochs[first + j].transition * cross;
-            let block = &axis.epochs[first + j].of_estimate * &cross;
-            correlation.view_mut((j * size, k * size), (size, size)).copy_from(&block);
+        let later = k + 1..count;
+        let block = |j: usize| {
+            cross = &axis.gains.epochs[first + j].transition * &cross;
+            &axis.epochs[first + j].of_estimate * &cross
+        };
+        below.push(later.map(block).collect());
+    }
+    let weights = if size <= SMALL { of_all(size, &below) } else { of_what_is_known(size, &below) };
+    QuadraticForm::new(&weights)
+}
+
+/// Eigenvalues of the matrix of unit blocks on the diagonal and ρ_jk, j > k, in `below[k][j − k − 1]`.
+fn of_all(size: usize, below: &[Vec<DMatrix<f64>>]) -> Vec<f64> {
+    let count = below.len();
+    let mut correlation = DMatrix::identity(count * size, count * size);
+    for (k, blocks) in below.iter().enumerate() {
+        for (block, j) in blocks.iter().zip(k + 1..) {
+            correlation.view_mut((j * size, k * size), (size, size)).copy_from(block);
         }
     }
     correlation.fill_upper_triangle_with_lower_triangle();
-    QuadraticForm::new(&symmetric_eigenvalues(&correlation))
+    symmetric_eigenvalues(&correlation)
+}
+
+/// The same of many states, most of which are forgotten between two epochs: what no other epoch knows more than [`UNKNOWN`] of, as correlation, has a weight of
+/// one, and the eigenvalues are those of the rest.
+fn of_what_is_known(size: usize, below: &[Vec<DMatrix<f64>>]) -> Vec<f64> {
+    let count = below.len();
+    // of all that epoch k shares with others, Σ_j ρ_jkᵀ ρ_jk
+    let mut shared = vec![DMatrix::zeros(size, size); count];
+    for (k, blocks) in below.iter().enumerate() {
+        for (block, j) in blocks.iter().zip(k + 1..) {
+            shared[k] += block.tr_mul(block);
+            shared[j] += block * block.transpose();
+        }
+    }
+    let known = |shared: DMatrix<f64>| {
+        let eigen = SymmetricEigen::new(shared);
+        let columns: Vec<_> = (0..size)
+            .filter(|i| eigen.eigenvalues[*i] > UNKNOWN * UNKNOWN)
+            .map(|i| eigen.eigenvectors.column(i).into_owned())
+            .collect();
+        if columns.is_empty() { DMatrix::zeros(size, 0) } else { DMatrix::from_columns(&columns) }
+    };
+    let bases: Vec<DMatrix<f64>> = shared.into_iter().map(known).collect();
+    let first: Vec<usize> = bases
+        .iter()
+        .scan(0, |sum, basis| {
+            let own = *sum;
+            *sum += basis.ncols();
+            Some(own)
+        })
+        .collect();
+    let total = bases.iter().map(DMatrix::ncols).sum();
+    let mut correlation = DMatrix::identity(total, total);
+    for (k, blocks) in below.iter().enumerate() {
+        for (block, j) in blocks.iter().zip(k + 1..) {
+            let block = bases[j].tr_mul(&(block * &bases[k]));
+            correlation.view_mut((first[j], first[k]), block.shape()).copy_from(&block);
+        }
+    }
+    correlation.fill_upper_triangle_with_lower_triangle();
+    let mut weights = symmetric_eigenvalues(&correlation);
+    weights.resize(count * size, 1.0);
+    weights
 }
 
 /// Law of a least p-value, from drawn ones.
@@ -347,5 +408,36 @@ impl Gate {
     pub fn family(&self, p: f64) -> f64 {
         let none: f64 = self.axes.iter().map(|axis| (-axis.family.cdf(p)).ln_1p()).sum();
         -none.exp_m1()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Nine states of which two, mixed with the others, are remembered (0.9 and 0.5 from one of six epochs to the next) and one a little (0.01): the weights are those of the whole matrix, to
+    /// 1e-9, at least 36 of the 54 being one, and those of epochs that know nothing of each other are all one.
+    #[test]
+    fn weights_of_what_is_known_are_those_of_all() {
+        let (size, count) = (9, 6);
+        let mix = DMatrix::from_fn(size, size, |i, j| ((1 + i) * (2 + 3 * j) % 17) as f64 - 8.0).qr().q();
+        let mut memory = DMatrix::zeros(size, size);
+        (memory[(0, 0)], memory[(1, 1)], memory[(2, 2)]) = (0.9, 0.5, 0.01);
+        let step = &mix * memory * mix.transpose();
+        let power = |n: usize| (1..n).fold(step.clone(), |product, _| product * &step);
+        let below: Vec<Vec<DMatrix<f64>>> =
+            (0..count).map(|k| (k + 1..count).map(|j| power(j - k)).collect()).collect();
+        let sorted = |mut weights: Vec<f64>| {
+            weights.sort_by(f64::total_cmp);
+            weights
+        };
+        let (known, all) = (sorted(of_what_is_known(size, &below)), sorted(of_all(size, &below)));
+        assert_eq!(known.len(), size * count);
+        assert!(known.iter().zip(&all).all(|(a, b)| (a - b).abs() < 1e-9), "{known:?} {all:?}");
+        assert!(all[size * count - 1] > 2.0, "{all:?}");
+        assert!(known.iter().filter(|w| **w == 1.0).count() >= 6 * count, "{known:?}");
+        let strangers: Vec<Vec<DMatrix<f64>>> =
+            (0..count).map(|k| (k + 1..count).map(|_| DMatrix::zeros(size, size)).collect()).collect();
+        assert!(of_what_is_known(size, &strangers).iter().all(|w| *w == 1.0));
     }
 }

@@ -18,8 +18,12 @@ use crate::noise::{Filter, Kind, Term};
 /// Processes of one kind at most.
 const MOST_GAUSS_MARKOV: usize = 3;
 const MOST_OSCILLATIONS: usize = 8;
-/// Longest moving average that is tried.
-pub(in crate::identify) const LONGEST_AVERAGE: u32 = 16;
+/// Moving averages of up to so many samples are all tried …
+const EACH_AVERAGE: u32 = 16;
+/// … and of up to so many the [`CARRIED`] that explain most of what is left, since each sample more is a state of the filter; longest that is tried.
+pub(in crate::identify) const LONGEST_AVERAGE: u32 = 64;
+/// What is near an average of more than [`EACH_AVERAGE`] samples differs from it by at most so many.
+const NEAR_AVERAGE: u32 = 2;
 /// Most poles, and zeros, of a band limit that are tried.
 pub(in crate::identify) const MOST_POLES: u8 = 6;
 /// And at first; more by one at a time.
@@ -238,7 +242,8 @@ fn additions(data: &Ordinates, base: &Fit) -> Vec<Start> {
         pieces.push(Piece::Quantization);
     }
     if !form.has(Kind::MovingAverage) && !limited {
-        pieces.extend((2..=LONGEST_AVERAGE).map(Piece::MovingAverage));
+        pieces.extend((2..=EACH_AVERAGE).map(Piece::MovingAverage));
+        pieces.extend(long_averages(data, base));
     }
     for (piece, most) in [
         (Piece::Flicker, 1),
@@ -252,6 +257,18 @@ fn additions(data: &Ordinates, base: &Fit) -> Vec<Start> {
         }
     }
     pieces.into_iter().flat_map(|piece| starts(data, base, piece)).collect()
+}
+
+/// Averages of more than [`EACH_AVERAGE`] samples that explain most of what `base` leaves.
+fn long_averages(data: &Ordinates, base: &Fit) -> Vec<Piece> {
+    let residual = Residual::new(data, base);
+    let of = |samples: u32| {
+        let piece = Piece::MovingAverage(samples);
+        Some((residual.gain(&piece.term(&[1.0])?).0, piece))
+    };
+    let mut found: Vec<(f64, Piece)> = (EACH_AVERAGE + 1..=LONGEST_AVERAGE).filter_map(of).collect();
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    found.iter().take(CARRIED).filter(|(gain, _)| *gain > 0.0).map(|(_, piece)| *piece).collect()
 }
 
 /// Not more than a band limit is: it is forgotten soon, so that it takes no drift, and its density is that of the noise, no part of it that is hidden below
@@ -344,15 +361,16 @@ fn rearrangements(data: &Ordinates, base: &Fit) -> Vec<Start> {
             continue;
         }
         let (form, logs) = base.form.without(&base.logs, at);
+        let own = base.form.split(&base.logs).nth(at).map(|(_, own)| own.to_vec()).unwrap_or_default();
         if let Piece::BandLimit(order) = *piece {
-            let own = base.form.split(&base.logs).nth(at).map(|(_, own)| own.to_vec()).unwrap_or_default();
             moves.extend(other_orders(&form, &logs, order, &own));
             let (form, logs, fresh) = form.with(&logs, Piece::White, &[whittle::level(data)]);
             moves.push((form, logs, fresh));
             continue;
         }
         moves.push((form.clone(), logs.clone(), 0..0));
-        let others = stand_ins(*piece, &form);
+        let others =
+            if is_drift(*piece, &own) { stand_ins(Piece::GaussMarkov, &form) } else { stand_ins(*piece, &form) };
         if others.is_empty() {
             continue;
         }
@@ -391,6 +409,11 @@ fn other_orders(form: &Form, logs: &[f64], order: u8, own: &[f64]) -> Vec<Start>
     moves
 }
 
+/// A line that is forgotten within a period is none: it has come for the lobe of an average, say, and stayed for the drift. `own`: its logarithms.
+fn is_drift(piece: Piece, own: &[f64]) -> bool {
+    piece == Piece::Oscillation && own[1] + own[2] < 0.0
+}
+
 /// What may stand in the place of `piece`; `form`: without it.
 fn stand_ins(piece: Piece, form: &Form) -> Vec<Piece> {
     let mut others = match piece {
@@ -398,8 +421,10 @@ fn stand_ins(piece: Piece, form: &Form) -> Vec<Piece> {
             vec![Piece::Flicker, Piece::RandomWalk, Piece::GaussMarkov, Piece::Ramp]
         }
         Piece::GaussMarkov => vec![Piece::Flicker, Piece::RandomWalk, Piece::Ramp, Piece::MovingAverage(2)],
-        Piece::MovingAverage(_) => {
-            (2..=LONGEST_AVERAGE).map(Piece::MovingAverage).chain([Piece::GaussMarkov]).collect()
+        Piece::MovingAverage(samples) => {
+            let near = samples.saturating_sub(NEAR_AVERAGE)..=(samples + NEAR_AVERAGE).min(LONGEST_AVERAGE);
+            let long = near.filter(|samples| *samples > EACH_AVERAGE);
+            (2..=EACH_AVERAGE).chain(long).map(Piece::MovingAverage).chain([Piece::GaussMarkov]).collect()
         }
         Piece::Oscillation | Piece::White | Piece::Quantization | Piece::BandLimit(_) | Piece::Filtered(_) => vec![],
     };

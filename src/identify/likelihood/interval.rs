@@ -174,6 +174,8 @@ pub(super) fn covariance(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 /// The signed root of the fall is nearly straight in the logarithm and is followed by secants; where it levels off, by growing steps.
 fn profile(data: &Ordinates, fit: &Fit, index: usize, [first, end]: [f64; 2], level: f64) -> Result<f64, f64> {
     let centre = fit.logs[index];
+    // where a line has moved on to bins that are wider, its own width is beyond what would be searched there
+    let end = if first > 0.0 { end.max(centre) } else { end.min(centre) };
     let inside = |v: f64| if first > 0.0 { v.min(end) } else { v.max(end) };
     let mut at = inside(centre + level * first);
     let mut from = fit.logs.clone();
@@ -233,6 +235,17 @@ mod tests {
         let form = Form::new(vec![Piece::White, Piece::GaussMarkov]);
         let fit = whittle::climb_all(&data, &form, &[0.0, 0.3_f64.ln(), 50.0_f64.ln()]).unwrap();
         (data, fit)
+    }
+
+    /// The search for a limit that would end on the wrong side of the value (a line that has moved to wider bins than those around its start is narrower than what is
+    /// searched there) finds none, instead of one that the value has passed: `tune` refuses such a document.
+    #[test]
+    fn no_limit_is_on_the_wrong_side_of_its_value() {
+        let (data, fit) = fitted(1);
+        for (index, value) in fit.logs.iter().enumerate() {
+            assert_eq!(profile(&data, &fit, index, [0.1, value - 1.0], NORMAL_95), Err(0.0), "{index}");
+            assert_eq!(profile(&data, &fit, index, [-0.1, value + 1.0], NORMAL_95), Err(0.0), "{index}");
+        }
     }
 
     /// Where a limit stands, the likelihood, at its maximum over all other parameters, has fallen by half of 1.96², of σ beside a correlation time without an upper limit by half of

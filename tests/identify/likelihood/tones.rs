@@ -125,7 +125,7 @@ fn the_length_of_an_average_may_be_said() {
         })
     };
     assert_eq!(["white+ma", "white+ma2", "white+ma3", "ma4+white"].map(samples), [Some(2), Some(2), Some(3), Some(4)]);
-    for bad in ["white+ma17", "white+ma1", "white+ma2+ma3"] {
+    for bad in ["white+ma65", "white+ma1", "white+ma2+ma3"] {
         assert!(parse_model(bad).is_err(), "{bad}");
     }
 }

@@ -362,7 +362,7 @@ fn band_limited_log_loses_its_shortest_averaging_times_only() {
 fn density_behind_a_filter_is_in_its_interval() {
     // scipy.signal.butter(2, 0.2)
     let low_pass = Filter::new(
-        &[0.067_455_273_889_071_89, 0.134_910_547_778_143_77, 0.067_455_273_889_071_89],
+        &[0.067_455_273_889_071_9, 0.134_910_547_778_143_77, 0.067_455_273_889_071_9],
         &[1.0, -1.142_980_502_539_901_1, 0.412_801_598_096_188_77],
     )
     .unwrap();

@@ -105,9 +105,10 @@ fn neighbours(shape: &Shape) -> Vec<Shape> {
 
 /// Fit the forced model, or grow one, to the points; if that does not explain the curve (p below 10⁻⁴), try without the shortest averaging times.
 ///
-/// The rule: only averaging factors up to 100 samples may be left out (anti-alias filters and vibration act there), [`REMAINING_RANGE`] must remain. A model is found on the points beyond; the shorter ones are then taken in, longest first, as long
-/// as the fit keeps a p-value of 0.001, and the model is found on those beyond [`MARGIN`] times the shortest of them (if there are enough of these and it explains them). If no model explains even the long averaging times, nothing is left out, unless the
-/// misfit √(χ²/dof) more than halves by it.
+/// The rule: only averaging factors up to 100 samples may be left out for that (anti-alias filters and vibration act there), and
+/// [`REMAINING_RANGE`] must remain. A model is found on the points beyond; the shorter ones are then taken in, longest first, as long
+/// as the fit keeps a p-value of 0.001. What counts is the model of those beyond [`MARGIN`] times the shortest of them, if enough remain and it
+/// explains them. If no model explains even the long averaging times, nothing is left out, unless the misfit √(χ²/dof) more than halves by it.
 pub(super) fn search(points: &Points, forced: Option<&Shape>) -> Table {
     let find = |points: &Points| match forced {
         None => grow(points),

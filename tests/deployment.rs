@@ -80,3 +80,54 @@ fn the_commands_of_the_ci_files_write_the_files_that_are_published() {
         }
     }
 }
+
+/// What cargo prints, offline: the package cache is there, since this test was built from it.
+fn cargo(args: &str) -> String {
+    let out = Command::new(env!("CARGO"))
+        .args(args.split(' '))
+        .arg("--offline")
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .output()
+        .unwrap();
+    assert!(out.status.success(), "cargo {args}: {}", String::from_utf8_lossy(&out.stderr));
+    String::from_utf8(out.stdout).unwrap()
+}
+
+/// What would be published: no log, no file of the workplace, the licences of what is linked.
+#[test]
+fn the_package_is_clean() {
+    let list = cargo("package --list --allow-dirty");
+    let files: Vec<&str> = list.lines().collect();
+    for name in ["Cargo.lock", "LICENSE-APACHE", "LICENSE-MIT", "README.md", "docs/third-party-licences.md"] {
+        assert!(files.contains(&name), "{name} is missing");
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for name in &files {
+        let size = std::fs::metadata(root.join(name)).map_or(0, |file| file.len());
+        assert!(size < 500_000, "{name}: {size} bytes");
+        let made = [".cargo_vcs_info.json", "Cargo.toml.orig"].contains(name);
+        assert!(made || !name.starts_with('.'), "{name} is of no use to who builds the package");
+        assert!(![".tmp", ".part", ".orig", "~"].iter().any(|end| name.ends_with(end)) || made, "{name} is left over");
+    }
+}
+
+/// docs/third-party-licences.md names every package that is linked into the program, in its version, and none that Cargo.lock has not.
+#[test]
+fn third_party_licences_are_those_of_the_lock_file() {
+    let page = doc("third-party-licences.md");
+    let listed: std::collections::BTreeSet<&str> =
+        page.lines().filter_map(|line| line.strip_prefix("- ")?.split(" (").next()).collect();
+    let tree = cargo("tree --edges normal --prefix none --locked --format {p}");
+    let linked = tree.lines().map(|line| line.trim_end_matches(" (*)").trim_end_matches(" (proc-macro)"));
+    let linked: std::collections::BTreeSet<String> =
+        linked.filter(|p| !p.starts_with("kfdesign ") && !p.is_empty()).map(|p| p.replacen(" v", " ", 1)).collect();
+    let missing: Vec<&String> = linked.iter().filter(|package| !listed.contains(package.as_str())).collect();
+    assert!(missing.is_empty(), "run the command at the top of the page: it lacks {missing:?}");
+    let lock = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.lock")).unwrap();
+    let locked = |package: &str| {
+        let (name, version) = package.split_once(' ').unwrap();
+        lock.contains(&format!("name = \"{name}\"\nversion = \"{version}\"\n"))
+    };
+    let gone: Vec<&str> = listed.into_iter().filter(|package| !locked(package)).collect();
+    assert!(gone.is_empty(), "run the command at the top of the page: it still has {gone:?}");
+}

@@ -451,11 +451,16 @@ mod command {
     /// may differ, and with it the rounding of a number in a thousand.
     #[test]
     fn the_log_in_data_is_made_again() {
+        let kept = data("skydog_10min.csv.gz");
+        if !kept.exists() && !data("../.ci").exists() {
+            println!("skipped: a published package has no logs");
+            return;
+        }
         let bench = Bench::new();
         let params = data("params.json");
         bench.ok(&format!("simulate {} -o log.csv --duration 10min --seed 1 --decimals 4", params.display()));
         let (header, made) = parse(&bench.read("log.csv"));
-        let (kept_header, kept) = parse(&gunzip(&std::fs::read(data("skydog_10min.csv.gz")).unwrap()));
+        let (kept_header, kept) = parse(&gunzip(&std::fs::read(kept).unwrap()));
         assert_eq!(header, kept_header);
         assert_eq!((made.len(), kept[0].len()), (13, 60_000));
         for ((name, made), kept) in header.iter().zip(&made).zip(&kept) {

@@ -296,6 +296,87 @@ fn params(found: &str, replaced: &str) -> Vec<u8> {
 const LINE: &str = r#""oscillation": { "std_dev": "0.1 deg/s", "frequency": "20 Hz", "correlation_time": "3 s" },
       "gauss_markov""#;
 
+/// Limits that are said, and sizes that no arithmetic in doubles can hold.
+#[test]
+fn parameters_beyond_the_limits() {
+    fn row<'a>(what: &'a str, found: &str, replaced: &str, words: &'a [&'a str]) -> Row<'a> {
+        (what, "params.json", params(found, replaced), "tune params.json -o out.json", words)
+    }
+    const TERM: &str = r#"{ "std_dev": "0.028 deg/s", "correlation_time": "190 s" }"#;
+    let terms = |count: usize| vec![TERM; count].join(", ");
+    let axis = |i: usize| format!(r#"{{"name": "a{i}", "white": {{"density": "1 deg/s/sqrt(Hz)"}}}}, "#);
+    let axes = |count: usize| format!("\"axes\": [{}", (1..count).map(axis).collect::<String>());
+    let sizes = "expected a size of 1e-30 to 1e30 in SI";
+    assert_refused(vec![
+        row("25 terms", TERM, &terms(24), &["axes[0].gauss_markov[23]: more than 24 noise terms on one axis; join"]),
+        row("65 axes", "\"axes\": [", &axes(65), &["axes: 65 axes; expected at most 64"]),
+        row("a million axes", "\"axes\": [", &axes(1_000_000), &["axes: 1000000 axes; expected at most 64"]),
+        row("large bias", "0.1 deg/s", "1e200 deg/s", &["axes[0].bias: ", "larger than any sensor's", sizes]),
+        row("large drift", "0.028 deg/s", "1e154 deg/s", &["axes[0].gauss_markov[0].std_dev: ", "larger", sizes]),
+        row("long drift", "190 s", "1e300 s", &["correlation_time: ", "larger than any sensor's", sizes]),
+        row("small drift", "0.028 deg/s", "1e-160 deg/s", &["std_dev: ", "smaller than any sensor's", sizes]),
+        row(
+            "white noise 1e7 times below the drift",
+            "0.0562 deg/s/sqrt(Hz)",
+            "2.8e-10 deg/s/sqrt(Hz)",
+            &[
+                "axis 'x': the white noise of a sample is",
+                "double precision",
+                "give white a density of at least",
+                "rad/s/sqrt(Hz)",
+            ],
+        ),
+    ]);
+    // the advice is true: twice the density that it names makes a filter that its own verification passes; so do as many terms as may be
+    let bench = Bench::new();
+    bench.file("params.json", params("0.0562 deg/s/sqrt(Hz)", "2.8e-10 deg/s/sqrt(Hz)"));
+    let said = bench.run("tune params.json").stderr;
+    let least = said.split("at least ").nth(1).unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
+    bench.file("quiet.json", params("0.0562 deg/s/sqrt(Hz)", &format!("{:e} rad/s/sqrt(Hz)", 2.0 * least)));
+    assert!(bench.ok("tune quiet.json").contains("consistent: 100 runs"));
+    let many: Vec<String> = (0..23).map(|k| TERM.replace("190", &format!("{}", 10.0 * 1.3f64.powi(k)))).collect();
+    bench.file("many.json", params(TERM, &many.join(", ")));
+    bench.ok("tune many.json --runs 8");
+}
+
+/// One sample that no sensor gives is named and left out; of a log of them nothing is left. No sum overflows, and nothing that was not judged passes.
+#[test]
+fn values_that_overflow_are_named() {
+    let bench = Bench::new();
+    bench.file("params.json", params("190 s", "5 s"));
+    bench.ok("simulate params.json -o good.csv --duration 200s --no-truth");
+    bench.ok("tune params.json -o filter.json");
+    let good = bench.read("good.csv");
+    for (value, count) in [("1e308", 1), ("-1e308", 1), ("1e155", 1), ("1e40", 3)] {
+        let mut lines: Vec<String> = good.lines().map(str::to_owned).collect();
+        for line in &mut lines[101..101 + count] {
+            *line = format!("{},{value}", line.split(',').next().unwrap());
+        }
+        bench.file("log.csv", lines.join("\n") + "\n");
+        for args in [
+            "compare params.json log.csv",
+            "replay filter.json log.csv --allow-inconclusive",
+            "identify log.csv",
+            "identify log.csv --method graphical",
+            "allan log.csv",
+            "inflate params.json log.csv",
+        ] {
+            let out = bench.run(args);
+            let are = if count == 1 { "1 value is".to_string() } else { format!("{count} values are") };
+            let named = format!("{are} infinite or beyond 1e30 in SI, which no sensor gives; skipped, not replaced");
+            assert!(out.status < 2 && out.stderr.contains(&named), "{args}, {value}: {out:?}");
+            let words = |text: &str| text.split(|c: char| !c.is_alphanumeric()).any(|w| ["inf", "NaN"].contains(&w));
+            assert!(!words(&out.stdout) && !words(&out.stderr), "{args}, {value}: {out:?}");
+        }
+    }
+    let all: String = good.lines().map(|l| format!("{},1e200\n", l.split(',').next().unwrap())).collect();
+    bench.file("log.csv", all.replacen(",1e200", ",gyro_x (deg/s)", 1));
+    for args in ["compare params.json log.csv", "replay filter.json log.csv", "identify log.csv"] {
+        let out = bench.run(args);
+        assert!(out.status != 0 && out.stderr.contains("values are infinite or beyond 1e30"), "{args}: {out:?}");
+    }
+}
+
 #[test]
 fn parameters_that_cannot_be_used() {
     let run = "tune params.json -o out.json";

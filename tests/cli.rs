@@ -89,6 +89,168 @@ fn two_outputs_of_one_name_are_refused_before_the_work() {
     assert!(bench.files().is_empty());
 }
 
+/// What a file is, its ending says; nothing is read, nothing done, nothing left.
+#[test]
+fn an_ending_that_is_not_what_is_written_is_refused_before_the_work() {
+    let bench = Bench::new();
+    for (args, said) in [
+        ("allan none.csv -o a.csv", "a.csv: -o writes JSON, not .csv; name it a.json"),
+        ("allan none.csv --plot a.png", "a.png: --plot writes SVG, not .png; name it a.svg"),
+        ("identify none.csv -o a.yaml", "a.yaml: -o writes JSON, not .yaml; name it a.json"),
+        ("identify none.csv --report r.pdf", "r.pdf: --report writes an HTML page, not .pdf; name it r.html"),
+        ("identify none.csv --plot p.PDF", "p.PDF: --plot writes SVG, not .pdf; name it p.svg"),
+        ("plan none.json --parameter a --precision 1% -o a.txt", "a.txt: -o writes JSON"),
+        ("compare none.json none.csv -o a.html", "a.html: -o writes JSON"),
+        ("compare none.json none.csv --report r.pdf", "r.pdf: --report writes an HTML page"),
+        ("compare none.json none.csv --plot p.png", "p.png: --plot writes SVG"),
+        ("inflate none.json none.csv -o a.txt", "a.txt: -o writes JSON"),
+        (
+            "simulate none.json -o a.txt --duration 1s",
+            "a.txt: cannot write: the extension says the format: .csv, .csv.gz",
+        ),
+        ("tune none.json -o a.txt", "a.txt: -o writes JSON"),
+        ("tune none.json --report r.pdf", "r.pdf: --report writes an HTML page"),
+        ("tune none.json --plot p.png", "p.png: --plot writes SVG"),
+        ("replay none.json none.csv -o est.txt", "est.txt: cannot write: the extension says the format"),
+        ("replay none.json none.csv --report r.pdf", "r.pdf: --report writes an HTML page"),
+        ("replay none.json none.csv --plot p.png", "p.png: --plot writes SVG"),
+        ("montecarlo none.json -o a.csv", "a.csv: -o writes JSON"),
+        ("montecarlo none.json --run 1 -o a.json", "a.json: cannot write: the extension says the format"),
+        ("montecarlo none.json --junit a.html", "a.html: --junit writes JUnit XML"),
+        ("montecarlo none.json --report r.pdf", "r.pdf: --report writes an HTML page"),
+        ("montecarlo none.json --every-step a.txt", "a.txt: cannot write: the extension says the format"),
+        ("merge none.json -o a.txt", "a.txt: -o writes JSON"),
+        ("import none.yaml -o a.yaml", "a.yaml: -o writes JSON"),
+        ("datasheet --rate 100 -o a.txt", "a.txt: -o writes JSON"),
+        ("export none.json --to kalibr -o a.html", "a.html: -o writes text, not .html; give it another ending"),
+    ] {
+        let out = bench.run(args);
+        assert!(out.status == 2 && out.stderr.contains(said) && out.stderr.lines().count() == 1, "{args}: {out:?}");
+    }
+    assert!(bench.files().is_empty());
+    let out = bench.run("identify none.csv -o /dev/null --report r.htm --plot p");
+    assert!(out.stderr.contains("none.csv: there is no such file"), "{out:?}");
+}
+
+/// The status is that of the work, whatever becomes of what it says.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_verdict_is_not_lost_with_its_output() {
+    let bench = Bench::new();
+    let params = data("params.json").display().to_string();
+    bench.ok(&format!("simulate {params} -o log.npy --duration 10min --seed 4"));
+    bench.ok(&format!("tune {params} -o good.json"));
+    // innovations half as large as this filter says
+    let mut wrong: serde_json::Value = serde_json::from_str(&bench.read("good.json")).unwrap();
+    for axis in wrong["axes"].as_array_mut().unwrap() {
+        axis.as_object_mut().unwrap().remove("steady_state");
+        axis["R"][0][0] = (axis["R"][0][0].as_f64().unwrap() * 4.0).into();
+    }
+    bench.file("wrong.json", wrong.to_string());
+    let small = "--runs 8 --duration 300s";
+    let truth = format!("--truth {params}");
+    assert!(bench.run(&format!("montecarlo wrong.json {truth} {small} -o shard.json")).status == 1);
+    let rows = [
+        ("replay wrong.json log.npy".to_string(), 1),
+        ("replay wrong.json log.npy --json".into(), 1),
+        (format!("montecarlo wrong.json {truth} {small} --json"), 1),
+        ("merge shard.json --json".into(), 1),
+        (format!("compare {params} log.npy --json"), 0),
+        ("replay good.json log.npy".into(), 0),
+        (format!("tune {params}"), 0),
+        ("identify log.npy --method graphical".into(), 0),
+        ("info log.npy".into(), 0),
+        ("completions bash".into(), 0),
+        ("--help".into(), 0),
+        ("replay none.json log.npy".into(), 2),
+        ("replay --nonsense".into(), 2),
+    ];
+    let run = |args: &str, stdout: Stdio, stderr: Stdio| {
+        let command = &mut Command::new(env!("CARGO_BIN_EXE_kfdesign"));
+        command.args(args.split_whitespace()).current_dir(bench.path("."));
+        let out = command.stdout(stdout).stderr(stderr).output().unwrap();
+        (out.status.code(), String::from_utf8_lossy(&out.stderr).into_owned())
+    };
+    let full = || Stdio::from(std::fs::File::options().write(true).open("/dev/full").unwrap());
+    // whose reader is gone before anything is written
+    let closed = || {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        Stdio::from(writer)
+    };
+    for (args, work) in &rows {
+        assert_eq!(run(args, Stdio::piped(), Stdio::piped()).0, Some(*work), "{args}");
+        assert_eq!(run(args, closed(), Stdio::piped()).0, Some(*work), "{args} | true");
+        assert_eq!(run(args, Stdio::piped(), closed()).0, Some(*work), "{args} 2>&1 | true");
+        assert_eq!(run(args, closed(), closed()).0, Some(*work), "{args} |& true");
+        assert_eq!(run(args, Stdio::piped(), full()).0, Some(*work), "{args} 2>/dev/full");
+        // a text that was asked for and did not fit is work not done; a verdict stays what it is
+        let (status, said) = run(args, full(), Stdio::piped());
+        assert_eq!(status, Some(if *work == 0 { 2 } else { *work }), "{args} >/dev/full: {said}");
+        let told = said.lines().last() == Some("kfdesign: stdout: cannot write: no space is left on the disk");
+        assert_eq!(told, *work == 0, "{args}: {said}");
+    }
+}
+
+/// Stacks that no machine has room for stand for a machine without threads: the same work, the same bytes.
+#[cfg(target_os = "linux")]
+#[test]
+fn without_threads_the_work_goes_on_with_one() {
+    let bench = Bench::new();
+    let params = data("params.json").display().to_string();
+    bench.ok(&format!("simulate {params} -o log.csv --duration 15min --seed 4"));
+    for args in [
+        "identify log.csv --json".to_string(),
+        "allan log.csv --json".into(),
+        format!("tune {params} --runs 8 --json"),
+        format!("tune {params} --runs 8 -o filter.json"),
+        "montecarlo filter.json --runs 8 --json".into(),
+        "montecarlo filter.json --runs 8 --threads 3 --json".into(),
+        "replay filter.json log.csv --json".into(),
+    ] {
+        let usual = bench.run(&args);
+        let out = Command::new(env!("CARGO_BIN_EXE_kfdesign"))
+            .args(args.split_whitespace())
+            .current_dir(bench.path("."))
+            .env("RUST_MIN_STACK", (1u64 << 60).to_string())
+            .output()
+            .unwrap();
+        assert_eq!(out.status.code(), Some(usual.status), "{args}: {}", String::from_utf8_lossy(&out.stderr));
+        assert!(String::from_utf8_lossy(&out.stdout) == usual.stdout, "{args}");
+    }
+}
+
+/// A pipe with a name is told of before it is opened, which would wait for its other end.
+#[cfg(unix)]
+#[test]
+fn a_named_pipe_is_refused_at_the_start() {
+    let bench = Bench::new();
+    assert!(Command::new("mkfifo").arg(bench.path("pipe.json")).status().unwrap().success());
+    std::os::unix::fs::symlink("pipe.json", bench.path("link.json")).unwrap();
+    bench.file("params.json", std::fs::read(data("params.json")).unwrap());
+    for args in [
+        "identify log.csv -o pipe.json",
+        "tune params.json -o link.json",
+        "tune pipe.json",
+        "simulate pipe.json -o log.csv --duration 1s",
+        "montecarlo link.json",
+        "merge pipe.json",
+        "compare pipe.json log.csv",
+        "inflate pipe.json log.csv",
+        "replay pipe.json log.csv",
+        "replay params.json pipe.json",
+        "export pipe.json --to kalibr",
+        "export pipe.json --to rust",
+        "import pipe.json",
+        "plan pipe.json --parameter white.density --precision 1%",
+        "info pipe.json",
+    ] {
+        let out = bench.run(args);
+        let told = out.stderr.contains("named pipe") || out.stderr.contains("save it to a file first");
+        assert!(out.status == 2 && told && out.stderr.lines().count() == 1, "{args}: {out:?}");
+    }
+}
+
 #[test]
 fn a_negative_value_reaches_its_own_message() {
     let bench = Bench::new();

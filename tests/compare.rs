@@ -95,7 +95,7 @@ fn test<'a>(found: &'a Comparison, name: &str) -> &'a Test {
 }
 
 fn failed(found: &Comparison) -> Vec<&str> {
-    found.tests.iter().filter(|t| !t.pass).map(|t| t.name.as_str()).collect()
+    found.tests.iter().filter(|t| !t.pass()).map(|t| t.name.as_str()).collect()
 }
 
 /// 30 logs of their own model: each is rejected in 1.3 % at most (docs/validation.md), so six or more of them with probability
@@ -137,7 +137,7 @@ fn wrong_drift_is_found_both_ways() {
         let found = compared(&[WHITE, drift(0.05)], &[WHITE, drift(0.05 * factor)], 20_000, 1);
         assert_eq!(found.verdict, Verdict::Inconsistent);
         let curve = test(&found, "allan_curve");
-        assert!(!curve.pass && curve.meaning.contains(word), "{}", curve.meaning);
+        assert!(!curve.pass() && curve.meaning.contains(word), "{}", curve.meaning);
         assert!((curve.effect.as_ref().unwrap().value.ln() - f64::ln(factor)).abs() < 0.5, "{}", curve.meaning);
         assert!(!test(&found, "spectrum_ratio").pass && test(&found, "nis").pass);
     }

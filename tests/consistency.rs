@@ -284,6 +284,25 @@ fn test_with(p: f64, effect: Option<[f64; 3]>) -> Test {
     }
 }
 
+/// Without a number nothing passes, by either rule, and no sentence claims that it did.
+#[test]
+fn what_is_no_number_never_passes() {
+    let none = [(f64::NAN, 0.5), (0.0, f64::NAN), (f64::INFINITY, 0.5), (f64::NAN, f64::NAN)];
+    for (statistic, p) in none {
+        let test = || Test::new("x", "t", statistic, [0.0, 1.0], p, "all is well".into());
+        let sound = || Test::new("x", "u", 0.5, [0.0, 1.0], 0.5, "all is well".into());
+        assert!(!test().pass() && !test().has_numbers() && test().meaning.contains("nothing can be said"));
+        assert!(!sound().pass(), "before it is judged");
+        let mut tests = [test(), sound()];
+        assert_eq!(judge(&mut tests, 0.01), Verdict::Inconclusive);
+        assert_eq!((tests[0].pass(), tests[1].pass()), (false, true));
+        let small = |test: Test| test.with_effect(Effect::new("e", 0.0, [0.0, 0.0], [-0.1, 0.1]));
+        let mut tests = [small(test()), small(sound())];
+        assert_eq!(effect::judge(&mut tests, 0.01, true), Verdict::Inconclusive);
+        assert_eq!((tests[0].pass(), tests[1].pass()), (false, true));
+    }
+}
+
 /// Every branch of the verdict on measured logs.
 #[test]
 fn verdict_weighs_significance_and_size() {
@@ -302,7 +321,8 @@ fn verdict_weighs_significance_and_size() {
     ];
     for (i, (mut tests, enough, expected)) in cases.into_iter().enumerate() {
         assert_eq!(effect::judge(&mut tests, 0.01, enough), expected, "case {i}");
-        assert_eq!(tests.iter().any(|t| !t.pass), expected == Verdict::Inconsistent, "case {i}");
+        let failed = tests.iter().any(|t| t.has_numbers() && !t.pass());
+        assert_eq!(failed, expected == Verdict::Inconsistent, "case {i}");
     }
     assert_eq!(judge(&mut [test_with(1e-9, Some([0.02, 0.03, 0.04]))], 0.01), Verdict::Inconsistent);
     assert_eq!(judge(&mut [test_with(0.02, None)], 0.01), Verdict::Consistent);

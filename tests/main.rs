@@ -19,6 +19,7 @@ mod filter;
 mod identify;
 mod import;
 mod input;
+mod interrupted;
 mod measured;
 mod model;
 mod montecarlo;

@@ -36,6 +36,42 @@ fn two_axes() -> String {
     params.to_string()
 }
 
+/// A drift that the filter learns in 1068 s. Runs are twice as long if no length is given; shorter ones are judged as far as they go, and say
+/// what they leave out; the 600 s of others stay theirs.
+#[test]
+fn runs_are_as_long_as_the_design_needs() {
+    let slow = SMALL.replace("5 s", "3000 s").replace("0.05 deg/s\"", "0.01 deg/s\"");
+    let slower = slow.replace("3000 s", "1e7 s").replace("0.01 deg/s\"", "0.001 deg/s\"");
+    for (params, expected, unsettled) in [(SMALL, 600.0, None), (&slow, 2.0, None), (&slower, 600.0, Some("x ("))] {
+        let bench = bench(params);
+        let design: Value = serde_json::from_str(&bench.read("filter.json")).unwrap();
+        let settling = design["axes"][0]["steady_state"]["settling_time"]["value"].as_f64().unwrap();
+        let out = bench.run("montecarlo filter.json --runs 4 --json");
+        assert!(out.status < 2, "{out:?}");
+        let document: Value = serde_json::from_str(&out.stdout).unwrap();
+        let duration = document["duration_s"].as_f64().unwrap();
+        let expected = if expected > 2.0 { expected } else { 2.0 * settling };
+        assert!((duration - expected).abs() <= 0.1, "{duration} s, settling {settling} s");
+        let said = document["meaning"].as_str().unwrap();
+        let words = unsettled.map_or("settled", |axis| axis);
+        assert_eq!(
+            said.contains("end before the filter has settled") && said.contains(words),
+            unsettled.is_some(),
+            "{said}"
+        );
+        // more runs go on from these
+        bench.run("montecarlo filter.json --runs 2 -o part.json");
+        assert!(bench.run("montecarlo filter.json --runs 4 --resume -o part.json").status < 2);
+        assert!(bench.read("part.json") == out.stdout);
+    }
+    let bench = bench(&slow);
+    let short = bench.run("montecarlo filter.json --runs 10 --duration 20s");
+    assert!(
+        short.status < 2 && short.stdout.contains("; runs of 20.00 s end before the filter has settled: x ("),
+        "{short:?}"
+    );
+}
+
 /// `text` as JSON with `change` made to it.
 fn changed(text: &str, change: impl FnOnce(&mut Value)) -> String {
     let mut value: Value = serde_json::from_str(text).unwrap();

@@ -389,7 +389,7 @@ fn a_wrong_design_is_caught() {
         ("x0 off by 1 sigma", wrong(&|m| m.x0[0] += m.p0[(0, 0)].sqrt())),
     ] {
         assert_eq!(outcome.verdict, Verdict::Inconsistent, "{what}: {:#?}", outcome.tests);
-        let worst = outcome.tests.iter().filter(|t| !t.pass).min_by(|a, b| a.p_value.total_cmp(&b.p_value)).unwrap();
+        let worst = outcome.tests.iter().filter(|t| !t.pass()).min_by(|a, b| a.p_value.total_cmp(&b.p_value)).unwrap();
         println!("{what}: {} p {:.1e}: {}", worst.name, worst.p_value, worst.meaning);
     }
 }

@@ -10,8 +10,9 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::files::{self, Kind};
 use super::log_flags::{LogFlags, print_check};
-use super::output::{digits, print_json, print_text, progress, refuse_same_output, table};
+use super::output::{digits, print_json, print_text, progress, say, table};
 use super::stretch::{Stretch, into_stretches};
 use super::{Status, allan_figure};
 use crate::allan::{self, AllanCurve, Deviation, NoiseType, TauGrid};
@@ -169,10 +170,7 @@ struct Header {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
-    refuse_same_output(&[("-o", &args.output), ("--plot", &args.plot)])?;
-    for output in args.output.iter().chain(&args.plot) {
-        atomic::check_output(output, &args.log)?;
-    }
+    files::check(&[("-o", &args.output, Kind::Json), ("--plot", &args.plot, Kind::Svg)], &[&args.log])?;
     let options = LogOptions { no_digest: true, ..args.reading.options()? };
     let (header, axes) = match windows::axes(args, &options)? {
         Some(found) => found,
@@ -198,7 +196,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         print_json(&document)?;
     } else {
         let text: Vec<String> = axes.iter().map(|axis| text(axis, args.deviation)).collect();
-        print_text(&text.join("\n"))?;
+        print_text(&text.join("\n"));
     }
     Ok(Status::Done)
 }
@@ -244,13 +242,13 @@ fn axis_curve(stretch: Stretch, dt: f64, kind: Deviation, grid: TauGrid) -> anyh
 /// What a person should know about an axis beside the numbers, on stderr.
 fn notes(axis: &AxisCurve) {
     if let Some(note) = &axis.note {
-        eprintln!("  note: {}: {note}", axis.name);
+        say(&format!("  note: {}: {note}", axis.name));
     }
     if let Err(reason) = &axis.fit {
-        eprintln!(
+        say(&format!(
             "  note: {}: intervals are for the power law at each tau, no mixture was fitted: {reason}",
             axis.name
-        );
+        ));
     }
 }
 

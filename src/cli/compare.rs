@@ -6,14 +6,14 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
 
-use super::Status;
+use super::files::{self, Kind, Output};
 use super::log_flags::{LogFlags, print_check};
-use super::output::{digits, notes, print_json, print_text, refuse_same_output, table};
+use super::output::{digits, notes, print_json, print_text, say, table};
 use super::stretch::stretches;
 use super::tests_table::{TESTS, caption, rows};
+use super::{Status, VerdictFlags};
 use crate::compare::parameters::parameters;
 use crate::compare::{self, AxisComparison, Beside, Comparison, Log, LogAxis};
-use crate::consistency::Verdict;
 use crate::export::atomic;
 use crate::import::{self, ImportError};
 use crate::params::{AxisParams, Params};
@@ -24,8 +24,8 @@ use crate::units::{Quantity, Unit};
 /// Does a noise model fit a log that it may not come from?
 ///
 /// The Allan curve within the envelope the model draws around its own, the spectrum over the model's, and what the model's filter leaves of the
-/// log. A test fails when its deviation is significant (Holm, over all tests and axes) and beyond what is tolerated. Exit status 1 only when
-/// the verdict is inconsistent.
+/// log. A test fails when its deviation is significant (Holm, over all tests and axes) and beyond what is tolerated. Exit status 1 when
+/// the verdict is inconsistent, or inconclusive without --allow-inconclusive.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples: kfdesign compare params.json other_day.csv --report compare.html; kfdesign compare imu.yaml log.bag --parameters"
@@ -54,6 +54,8 @@ pub struct Args {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
+    judging: VerdictFlags,
+    #[command(flatten)]
     reading: LogFlags,
 }
 
@@ -73,23 +75,14 @@ impl Pair {
     /// On stderr, of the axes that are named.
     pub(super) fn print_left_out(&self, axes: &[&str]) {
         for (axis, note) in self.log.axes.iter().zip(&self.left_out).filter(|(axis, _)| axes.contains(&&*axis.name)) {
-            note.iter().for_each(|note| eprintln!("  note: {}: {note}", axis.name));
+            note.iter().for_each(|note| say(&format!("  note: {}: {note}", axis.name)));
         }
     }
 }
 
 /// Reads both, prints the log check, and refuses to overwrite either with one of `outputs`, named with their flags.
-pub(super) fn read(
-    params: &Path,
-    log: &Path,
-    reading: &LogFlags,
-    outputs: &[(&str, &Option<PathBuf>)],
-) -> anyhow::Result<Pair> {
-    refuse_same_output(outputs)?;
-    for output in outputs.iter().filter_map(|(_, path)| path.as_ref()) {
-        atomic::check_output(output, log)?;
-        atomic::refuse_input_as_output(output, params)?;
-    }
+pub(super) fn read(params: &Path, log: &Path, reading: &LogFlags, outputs: &[Output<'_>]) -> anyhow::Result<Pair> {
+    files::check(outputs, &[params, log])?;
     let given = given(params)?;
     let options = reading.options()?;
     let (recording, check) = crate::input::read(log, &options)?;
@@ -134,7 +127,7 @@ fn given(path: &Path) -> anyhow::Result<Vec<Params>> {
         }
         _ => anyhow!(error),
     })?;
-    found.warnings.iter().for_each(|warning| eprintln!("  warning: {warning}"));
+    found.warnings.iter().for_each(|warning| say(&format!("  warning: {warning}")));
     Ok(found.sensors)
 }
 
@@ -149,7 +142,8 @@ fn of_quantity(mut given: Vec<Params>, quantity: Quantity, path: &Path) -> anyho
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     compare::check_alpha(args.alpha)?;
-    let outputs = [("-o", &args.output), ("--report", &args.report), ("--plot", &args.plot)];
+    let outputs =
+        [("-o", &args.output, Kind::Json), ("--report", &args.report, Kind::Html), ("--plot", &args.plot, Kind::Svg)];
     let pair = read(&args.params, &args.log, &args.reading, &outputs)?;
     pair.print_left_out(&pair.log.axes.iter().map(|axis| &*axis.name).collect::<Vec<_>>());
     let mut result =
@@ -181,12 +175,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if args.json {
         print_json(&result)?;
     } else {
-        print_text(&text(&result, &pair.unit))?;
+        print_text(&text(&result, &pair.unit));
     }
-    Ok(match result.verdict {
-        Verdict::Inconsistent => Status::CheckFailed,
-        Verdict::Consistent | Verdict::Inconclusive => Status::Done,
-    })
+    Ok(args.judging.status([result.verdict]))
 }
 
 const MEANS: [&str; 6] = ["axis", "log column", "samples", "mean of log", "simulated mean", "sigma of a mean"];

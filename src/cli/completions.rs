@@ -18,6 +18,6 @@ pub struct Args {
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut Cli::command(), "kfdesign", &mut script);
-    print_text(&String::from_utf8(script)?)?;
+    print_text(&String::from_utf8(script)?);
     Ok(Status::Done)
 }

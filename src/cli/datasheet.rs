@@ -98,6 +98,7 @@ enum InstabilityArg {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     check_rate(Some(args.rate))?;
+    super::files::check(&[("-o", &args.output, super::files::Kind::Json)], &[])?;
     let sheet = args.sheet()?;
     let found = parameters(&sheet).map_err(|message| anyhow!(message))?;
     finish(&found, "the datasheet", args.output.as_deref(), None, args.json)

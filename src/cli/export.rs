@@ -7,8 +7,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow, bail};
 
 use super::Status;
+use super::files::{self, Kind};
 use super::flags::with_unit;
-use super::output::{digits, print_text};
+use super::output::{digits, print_text, say};
 use crate::export::atomic;
 use crate::export::consumer::{Choice, Export, Sensor, Target, Walk, write};
 use crate::params::Params;
@@ -98,6 +99,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
             bail!("{name} {value}: expected a number above zero");
         }
     }
+    let inputs: Vec<&Path> = std::iter::once(args.params.as_path()).chain(args.accelerometer.as_deref()).collect();
+    files::check(&[("-o", &args.output, Kind::Other)], &inputs)?;
     let walk = walk(args.walk.as_deref().unwrap_or("short"))?;
     let mut export = Export {
         gyro: None,
@@ -117,9 +120,6 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     };
     for (path, given) in [(Some(&args.params), ""), (args.accelerometer.as_ref(), "--accelerometer ")] {
         let Some(path) = path else { continue };
-        if let Some(output) = &args.output {
-            atomic::refuse_input_as_output(output, path)?;
-        }
         let params = Params::read(path)?;
         if !given.is_empty() && params.quantity != Quantity::SpecificForce {
             bail!(
@@ -132,14 +132,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     }
     let written = write(target, &export).map_err(|message| anyhow!(message))?;
     for warning in &written.warnings {
-        eprintln!("  warning: {warning}");
+        say(&format!("  warning: {warning}"));
     }
     match &args.output {
         Some(path) => {
             atomic::write(path, written.text.as_bytes())?;
-            print_text(&format!("{} written\n", path.display()))?;
+            print_text(&format!("{} written\n", path.display()));
         }
-        None => print_text(&written.text)?,
+        None => print_text(&written.text),
     }
     Ok(Status::Done)
 }

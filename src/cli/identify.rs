@@ -14,8 +14,9 @@ use serde::Serialize;
 
 use super::Status;
 use super::allan::AxisCurve;
+use super::files::{self, Kind};
 use super::log_flags::{LogFlags, print_check};
-use super::output::{digits, duration, print_json, print_text, progress, refuse_same_output, table};
+use super::output::{digits, duration, print_json, print_text, progress, say, table};
 use super::stretch::{Stretch, stretches};
 use crate::allan::wavelet::{self, Level};
 use crate::export::atomic;
@@ -226,10 +227,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if args.logs.len() > 1 && args.method != MethodArg::Likelihood {
         bail!("{} logs: only --method likelihood takes more than one", args.logs.len());
     }
-    refuse_same_output(&[("-o", &args.output), ("--report", &args.report), ("--plot", &args.plot)])?;
-    for output in [&args.output, &args.report, &args.plot].into_iter().flatten() {
-        args.logs.iter().try_for_each(|log| atomic::check_output(output, log))?;
-    }
+    let outputs =
+        [("-o", &args.output, Kind::Json), ("--report", &args.report, Kind::Html), ("--plot", &args.plot, Kind::Svg)];
+    files::check(&outputs, &args.logs.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
     let mut options = args.reading.options()?;
     options.temperature = match args.temperature.as_deref().map(str::trim) {
         Some("none") => TemperatureColumn::Ignored,
@@ -275,7 +275,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     } else {
         let mut text: Vec<String> = axes.iter().map(|axis| text(axis, params.quantity)).collect();
         text.extend(shared.as_ref().map(shared_words));
-        print_text(&text.join("\n"))?;
+        print_text(&text.join("\n"));
     }
     Ok(Status::Done)
 }
@@ -320,7 +320,7 @@ fn whole(args: &Args, choice: &ModelChoice, options: &LogOptions) -> anyhow::Res
     bar.finish_and_clear();
     for AxisCurve { name, note, .. } in axes.iter().map(|axis| &axis.measured) {
         if let Some(note) = note {
-            eprintln!("  note: {name}: {note}");
+            say(&format!("  note: {name}: {note}"));
         }
     }
     Ok((log, axes))

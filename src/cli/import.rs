@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 
 use super::Status;
+use super::files::{self, Kind};
 use super::identify::tables::term_rows;
-use super::output::{digits, print_json, print_text, refuse_same_output, table};
+use super::output::{digits, print_json, print_text, say, table};
 use crate::export::atomic;
 use crate::import::{self, Imported};
 use crate::params::Params;
@@ -37,10 +38,8 @@ pub struct Args {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     check_rate(args.rate)?;
-    refuse_same_output(&[("-o", &args.output), ("--accelerometer", &args.accelerometer)])?;
-    for output in [&args.output, &args.accelerometer].into_iter().flatten() {
-        atomic::check_output(output, &args.file)?;
-    }
+    let outputs = [("-o", &args.output, Kind::Json), ("--accelerometer", &args.accelerometer, Kind::Json)];
+    files::check(&outputs, &[&args.file])?;
     let found = import::read(&args.file, args.rate)?;
     finish(&found, &args.file.display().to_string(), args.output.as_deref(), args.accelerometer.as_deref(), args.json)
 }
@@ -66,7 +65,7 @@ pub(super) fn finish(
         bail!("--accelerometer: {name} has no accelerometer");
     }
     for warning in &found.warnings {
-        eprintln!("  warning: {warning}");
+        say(&format!("  warning: {warning}"));
     }
     let mut written = String::new();
     for (path, params) in [(output, Some(first)), (accelerometer, of_force)] {
@@ -78,7 +77,7 @@ pub(super) fn finish(
     if json {
         print_json(first)?;
     } else {
-        print_text(&format!("{}{written}", text(found)))?;
+        print_text(&format!("{}{written}", text(found)));
     }
     Ok(Status::Done)
 }

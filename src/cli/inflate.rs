@@ -6,6 +6,7 @@ use anyhow::{Context, bail};
 
 use super::Status;
 use super::compare::read;
+use super::files::Kind;
 use super::log_flags::LogFlags;
 use super::output::{digits, notes, print_json, print_text, table};
 use crate::compare::inflation::{AxisInflation, Inflation, inflated, inflation, usual_from_hz};
@@ -39,7 +40,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if let Some(from) = args.from.filter(|f| !(f.is_finite() && *f > 0.0)) {
         bail!("--from is {from}, expected a frequency above 0 Hz");
     }
-    let pair = read(&args.params, &args.log, &args.reading, &[("-o", &args.output)])?;
+    let pair = read(&args.params, &args.log, &args.reading, &[("-o", &args.output, Kind::Json)])?;
     let name = args.log.display().to_string();
     let from = args.from.unwrap_or_else(|| usual_from_hz(pair.log.sample_rate_hz));
     let mut found = inflation(&pair.params, &pair.log, from).with_context(|| name.clone())?;
@@ -55,7 +56,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if args.json {
         print_json(&found)?;
     } else {
-        print_text(&text(&found, &pair.unit))?;
+        print_text(&text(&found, &pair.unit));
     }
     Ok(Status::Done)
 }

@@ -27,7 +27,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if args.json {
         print_json(&found)?;
     } else {
-        print_text(&text(&args.log.display().to_string(), &found, args.all))?;
+        print_text(&text(&args.log.display().to_string(), &found, args.all));
     }
     Ok(Status::Done)
 }

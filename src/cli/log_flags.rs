@@ -3,6 +3,7 @@
 use clap::{Args, ValueEnum};
 
 use super::flags::with_unit;
+use super::output::say;
 use crate::input::{InputKind, LogOptions, TemperatureColumn};
 use crate::signal::LogCheck;
 use crate::units::{Dimension, Quantity, Unit};
@@ -106,14 +107,14 @@ fn seconds(flag: &str, text: &str) -> anyhow::Result<f64> {
 
 /// The log check on stderr, one line a finding.
 pub fn print_check(name: &str, check: &LogCheck) {
-    eprintln!(
+    say(&format!(
         "{name}: {} samples at {:.6} Hz, {:.1} s{}",
         check.samples,
         check.sample_rate_hz,
         check.span_s,
         if check.findings.is_empty() { ", nothing unusual" } else { "" }
-    );
+    ));
     for finding in &check.findings {
-        eprintln!("  {}: {}", if finding.serious { "warning" } else { "note" }, finding.message);
+        say(&format!("  {}: {}", if finding.serious { "warning" } else { "note" }, finding.message));
     }
 }

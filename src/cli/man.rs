@@ -26,7 +26,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     // gives every command its full name
     cli.build();
     let Some(folder) = &args.output else {
-        print_text(&page(cli)?)?;
+        print_text(&page(cli)?);
         return Ok(Status::Done);
     };
     // the command that clap adds for help has no page of its own
@@ -41,7 +41,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     for (name, text) in &pages {
         atomic::write(&folder.join(name), text.as_bytes())?;
     }
-    print_text(&format!("{} pages in {}\n", pages.len(), folder.display()))?;
+    print_text(&format!("{} pages in {}\n", pages.len(), folder.display()));
     Ok(Status::Done)
 }
 

@@ -1,8 +1,7 @@
 //! One file per command; the only place that prints and exits (floor 7).
 //!
-//! Exit status: 0 done and consistent; 1 done, but a stated check failed; 2 could not do it, with one clear line.
-
-#![allow(clippy::print_stdout, clippy::print_stderr, reason = "the command line is the one place that prints")]
+//! Exit status: 0 done and consistent; 1 done, but a stated check failed or could not be judged; 2 could not do it, with one clear line.
+//! It is that of the work, once known, whatever happens to stdout or stderr.
 
 mod aid_columns;
 pub mod allan;
@@ -11,6 +10,7 @@ pub mod compare;
 pub mod completions;
 pub mod datasheet;
 pub mod export;
+mod files;
 mod flags;
 pub mod identify;
 pub mod import;
@@ -24,6 +24,7 @@ pub mod plan;
 pub mod replay;
 pub mod schema;
 pub mod simulate;
+mod stop;
 mod stretch;
 mod tests_table;
 pub mod tune;
@@ -33,13 +34,37 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use self::output::{exit_status, print_help, say};
+pub use self::stop::Stop;
+use crate::consistency::Verdict;
+
 /// How a command ended when it could do its work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
     /// Exit 0.
     Done,
-    /// Exit 1: done, but a stated check failed.
+    /// Exit 1: done, but a stated check failed, or nothing could be judged.
     CheckFailed,
+}
+
+/// What a verdict that says nothing counts for.
+#[derive(Clone, Copy, Debug, Default, clap::Args)]
+pub struct VerdictFlags {
+    /// Exit status 0, not 1, also when the verdict is inconclusive
+    #[arg(long)]
+    allow_inconclusive: bool,
+}
+
+impl VerdictFlags {
+    /// The status that these verdicts together stand for.
+    fn status(self, verdicts: impl IntoIterator<Item = Verdict>) -> Status {
+        let good = |verdict: Verdict| match verdict {
+            Verdict::Consistent => true,
+            Verdict::Inconclusive => self.allow_inconclusive,
+            Verdict::Inconsistent => false,
+        };
+        if verdicts.into_iter().all(good) { Status::Done } else { Status::CheckFailed }
+    }
 }
 
 /// Kalman-filter design workbench for inertial sensors: identify, tune, replay, prove.
@@ -48,7 +73,7 @@ pub enum Status {
     name = "kfdesign",
     version,
     about,
-    after_help = "Exit status: 0 done and consistent; 1 done, but a stated check failed; 2 could not do it.\nUnits are never guessed: the log's header or --unit says them."
+    after_help = "Exit status: 0 done and consistent; 1 done, but a stated check failed, or the verdict is inconclusive\n(see --allow-inconclusive); 2 could not do it. It is that of the work, whatever becomes of its output.\nUnits are never guessed: the log's header or --unit says them."
 )]
 pub struct Cli {
     #[command(subcommand)]
@@ -77,19 +102,20 @@ enum Command {
 }
 
 /// Parse the process arguments, run, map to the exit status.
-pub fn main() -> ExitCode {
+pub fn main(stop: &Stop) -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) if error.use_stderr() => {
-            eprintln!("kfdesign: {}", usage_error(&error));
+            say(&format!("kfdesign: {}", usage_error(&error)));
             return ExitCode::from(2);
         }
         Err(help) => {
-            // help and version go to stdout; a closed pipe is no error
-            let _ = help.print();
-            return ExitCode::SUCCESS;
+            // help and version
+            print_help(&help);
+            return ExitCode::from(exit_status(0));
         }
     };
+    find_threads();
     let result = match cli.command {
         Command::Info(args) => info::run(&args),
         Command::Allan(args) => allan::run(&args),
@@ -100,7 +126,7 @@ pub fn main() -> ExitCode {
         Command::Simulate(args) => simulate::run(&args),
         Command::Tune(args) => tune::run(&args),
         Command::Replay(args) => replay::run(&args),
-        Command::Montecarlo(args) => montecarlo::run(&args),
+        Command::Montecarlo(args) => montecarlo::run(&args, stop),
         Command::Merge(args) => montecarlo::merge(&args),
         Command::Export(args) => export::run(&args),
         Command::Import(args) => import::run(&args),
@@ -109,14 +135,21 @@ pub fn main() -> ExitCode {
         Command::Completions(args) => completions::run(&args),
         Command::Man(args) => man::run(&args),
     };
-    match result {
-        Ok(Status::Done) => ExitCode::SUCCESS,
-        Ok(Status::CheckFailed) => ExitCode::from(1),
-        Err(error) if output::is_broken_pipe(&error) => ExitCode::SUCCESS,
+    ExitCode::from(exit_status(match result {
+        Ok(Status::Done) => 0,
+        Ok(Status::CheckFailed) => 1,
         Err(error) => {
-            eprintln!("kfdesign: {}", in_one_line(&error));
-            ExitCode::from(2)
+            say(&format!("kfdesign: {}", in_one_line(&error)));
+            2
         }
+    }))
+}
+
+/// Where the machine gives no threads, for want of processes or of memory, this one does all the work. Rayon makes its threads at the first
+/// need and cannot go on without them, so it is tried before.
+fn find_threads() {
+    if rayon::ThreadPoolBuilder::new().build().is_err() {
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global();
     }
 }
 

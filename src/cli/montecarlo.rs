@@ -7,24 +7,21 @@ mod text;
 use std::borrow::Cow;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use signal_hook::consts::{SIGINT, SIGTERM};
-use signal_hook::flag;
 
-use super::Status;
+use super::files::{self, Kind};
 use super::flags::{whole, with_unit};
-use super::output::{digits, print_text, progress, refuse_same_output};
-use crate::consistency::Verdict;
+use super::output::{digits, print_text, progress};
+use super::{Status, Stop, VerdictFlags};
 use crate::export::{atomic, junit};
 use crate::filter::FilterDesign;
 use crate::montecarlo::calibration::{self, MAX_REPLICATES, MAX_RUN, REPLICATES};
 use crate::montecarlo::course::{MAX_STEPS, MIN_STEPS};
 use crate::montecarlo::document::{self, Shard};
 use crate::montecarlo::every_step::MAX_EVERY_STEP;
+use crate::montecarlo::experiment::default_steps;
 use crate::montecarlo::gate::Gate;
 use crate::montecarlo::power::{self, Mistuning};
 use crate::montecarlo::{Course, Experiment, Outcome, Runs, Totals, conclude};
@@ -50,9 +47,10 @@ pub struct Args {
     /// Number of runs, or a range A..B of run numbers (B not included)
     #[arg(long, default_value = "1000", value_name = "N|A..B", allow_hyphen_values = true)]
     runs: String,
-    /// Length of a run, for example 600s or 2h
-    #[arg(long, default_value = "600s", value_name = "TIME", allow_hyphen_values = true)]
-    duration: String,
+    /// Length of a run, for example 600s or 2h [default: 600s; where the filter settles more slowly, twice its settling time, up to 600000
+    /// samples]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
+    duration: Option<String>,
     #[arg(long, default_value_t = 1, value_name = "N", value_parser = whole::<u64>, allow_negative_numbers = true)]
     seed: u64,
     /// Probability of a false alarm, over all tests and axes together
@@ -74,7 +72,7 @@ pub struct Args {
     /// Average NEES and NIS at every step, as a table (.csv, .csv.gz or .npy)
     #[arg(long, value_name = "FILE", conflicts_with = "run")]
     every_step: Option<PathBuf>,
-    /// Go on from what -o FILE holds of the same experiment
+    /// Go on from what -o FILE holds of the same experiment; without it, a file that is there is replaced only when the work is done
     #[arg(long, requires = "output")]
     resume: bool,
     /// Threads; the results do not depend on it
@@ -112,6 +110,8 @@ struct Outputs {
     /// Verdict, curves and figures on one page
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
+    #[command(flatten)]
+    judging: VerdictFlags,
     /// Print what the gate would see: the smallest mistuning of every parameter that is caught with 90 % probability
     #[arg(long)]
     power: bool,
@@ -123,26 +123,23 @@ struct Outputs {
     plan: Vec<String>,
 }
 
-pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
+pub(super) fn run(args: &Args, stop: &Stop) -> anyhow::Result<Status> {
+    // the runs end at their next checkpoint, but not what judges them
+    stop.heed(args.run.is_none());
     let inputs: Vec<&Path> = std::iter::once(args.filter.as_path()).chain(args.truth.as_deref()).collect();
-    args.outputs.check(&inputs, &args.every_step)?;
+    let kind = if args.run.is_some() { Kind::Table } else { Kind::Json };
+    args.outputs.check(&inputs, kind, &args.every_step)?;
     let design = FilterDesign::read(&args.filter)?;
     let truth = args.truth.as_deref().map(Params::read).transpose()?;
-    let duration_s = with_unit("--duration", &args.duration, Dimension::TIME, "600s")?;
-    let steps = (duration_s * design.sample_rate_hz).round();
-    if !(MIN_STEPS as f64..=MAX_STEPS as f64).contains(&steps) {
-        let rate = design.sample_rate_hz;
-        let [least, most] = [MIN_STEPS, MAX_STEPS].map(|steps| digits(steps as f64 / rate));
-        bail!(
-            "--duration {}: expected {least} s to {most} s ({MIN_STEPS} to {MAX_STEPS} samples at {rate} Hz)",
-            args.duration
-        );
-    }
+    let steps = match &args.duration {
+        Some(text) => steps(text, design.sample_rate_hz)?,
+        None => default_steps(&design),
+    };
     let experiment = Experiment {
         design,
         truth,
         truth_spread: args.truth_spread,
-        steps: steps as u64,
+        steps,
         seed: args.seed,
         alpha: args.alpha,
         replicates: args.replicates,
@@ -150,21 +147,34 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if !(experiment.alpha > 0.0 && experiment.alpha < 1.0) {
         bail!("--alpha {}: expected a probability between 0 and 1, for example 0.01", args.alpha);
     }
-    let threads = args.threads.unwrap_or(0);
-    if args.threads.is_some_and(|threads| !(1..=MAX_THREADS).contains(&threads)) {
+    if let Some(threads) = args.threads.filter(|threads| !(1..=MAX_THREADS).contains(threads)) {
         bail!("--threads {threads}: expected 1 to {MAX_THREADS}");
     }
     if let Some(number) = args.run.filter(|number| *number >= MAX_RUN) {
         bail!("--run {number}: expected a number below {MAX_RUN}");
     }
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().context("--threads")?;
-    pool.install(|| {
+    let work = || {
         let course = experiment.course().with_context(|| args.filter.display().to_string())?;
         match args.run {
             Some(number) => tables::one_run(args, &experiment, &course, number),
-            None => many_runs(args, &experiment, &course),
+            None => many_runs(args, &experiment, &course, stop),
         }
-    })
+    };
+    // where there are no more threads to be had, those that are there do the work
+    match args.threads.map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build()) {
+        Some(Ok(pool)) => pool.install(work),
+        Some(Err(_)) | None => work(),
+    }
+}
+
+/// Samples of a run of this length.
+fn steps(text: &str, rate: f64) -> anyhow::Result<u64> {
+    let steps = (with_unit("--duration", text, Dimension::TIME, "600s")? * rate).round();
+    if !(MIN_STEPS as f64..=MAX_STEPS as f64).contains(&steps) {
+        let [least, most] = [MIN_STEPS, MAX_STEPS].map(|steps| digits(steps as f64 / rate));
+        bail!("--duration {text}: expected {least} s to {most} s ({MIN_STEPS} to {MAX_STEPS} samples at {rate} Hz)");
+    }
+    Ok(steps as u64)
 }
 
 /// `1000` or `500..1000`.
@@ -181,7 +191,7 @@ fn range(text: &str) -> anyhow::Result<Range<u64>> {
     }
 }
 
-fn many_runs(args: &Args, experiment: &Experiment, course: &Course) -> anyhow::Result<Status> {
+fn many_runs(args: &Args, experiment: &Experiment, course: &Course, stop: &Stop) -> anyhow::Result<Status> {
     let runs = range(&args.runs)?;
     if runs.end - runs.start < 2 && !args.runs.contains("..") {
         bail!("--runs {}: one run judges nothing; expected at least 2", args.runs);
@@ -209,17 +219,12 @@ fn many_runs(args: &Args, experiment: &Experiment, course: &Course) -> anyhow::R
             (Some(shard.totals(course)?), shard.runs.end)
         }
     };
-    let stop = Arc::new(AtomicBool::new(false));
-    // the runs end at their next checkpoint; a second request, or one while they are judged, ends at once
-    for signal in [SIGINT, SIGTERM] {
-        flag::register_conditional_shutdown(signal, 2, Arc::clone(&stop))
-            .and_then(|_| flag::register(signal, Arc::clone(&stop)))
-            .context("cannot watch for Ctrl-C")?;
-    }
     let axes = course.axes.len() as u64;
     let bar = progress((runs.end - runs.start) * axes, "runs");
     bar.set_position((next - runs.start) * axes);
     bar.reset_eta();
+    // what is there before is not given up for unfinished work, unless that goes on from it
+    let kept = args.outputs.output.as_deref().filter(|path| args.resume || !path.exists());
     let mut saved = Instant::now();
     let mut failure = None;
     let partial = |totals: &[Totals], end: u64| {
@@ -227,8 +232,8 @@ fn many_runs(args: &Args, experiment: &Experiment, course: &Course) -> anyhow::R
         document::partial_json(experiment, course, done, totals)
     };
     let (totals, end) = course.sums_until(next..runs.end, start, &|count| bar.inc(count), &mut |totals, end| {
-        let stopping = stop.load(Ordering::Relaxed);
-        if let Some(path) = args.outputs.output.as_deref().filter(|_| stopping || saved.elapsed() > CHECKPOINT) {
+        let stopping = stop.is_wanted();
+        if let Some(path) = kept.filter(|_| stopping || saved.elapsed() > CHECKPOINT) {
             failure = atomic::write(path, partial(totals, end).as_bytes()).err();
             saved = Instant::now();
         }
@@ -241,23 +246,26 @@ fn many_runs(args: &Args, experiment: &Experiment, course: &Course) -> anyhow::R
     next = end;
     if next < runs.end {
         let done = next - runs.start;
-        match &args.outputs.output {
+        match kept {
             Some(path) => bail!(
                 "interrupted after {done} of {} runs, which are in {}; the same command with --resume goes on",
                 runs.end - runs.start,
                 path.display()
             ),
-            None => bail!(
-                "interrupted after {done} of {} runs; with -o FILE they would have been kept",
-                runs.end - runs.start
-            ),
+            None => {
+                let how = match &args.outputs.output {
+                    Some(path) => format!("{} is as it was: with --resume, or another -o", path.display()),
+                    None => "with -o FILE".into(),
+                };
+                bail!("interrupted after {done} of {} runs; {how} they would have been kept", runs.end - runs.start)
+            }
         }
     }
     // the runs are kept while they are judged, which can take longer than they did
-    if let Some(path) = args.outputs.output.as_ref().filter(|path| is_ordinary(path)) {
+    if let Some(path) = kept {
         atomic::write(path, partial(&totals, end).as_bytes())?;
     }
-    stop.store(true, Ordering::Relaxed);
+    stop.heed(false);
     let truth = args.truth.iter().map(|path| ("truth's parameters".to_string(), path.display().to_string()));
     let filter = std::iter::once(("filter".to_string(), args.filter.display().to_string()));
     let sources: Vec<_> = filter.chain(truth).collect();
@@ -269,7 +277,7 @@ fn many_runs(args: &Args, experiment: &Experiment, course: &Course) -> anyhow::R
 
 pub(super) fn merge(args: &MergeArgs) -> anyhow::Result<Status> {
     let inputs: Vec<&Path> = args.shards.iter().map(PathBuf::as_path).collect();
-    args.outputs.check(&inputs, &None)?;
+    args.outputs.check(&inputs, Kind::Json, &None)?;
     let shards = args.shards.iter().map(|path| Shard::read(path)).collect::<Result<Vec<_>, _>>()?;
     let shards = document::in_order(shards)?;
     let (Some(first), Some(last)) = (shards.first(), shards.last()) else { bail!("nothing to merge") };
@@ -285,24 +293,19 @@ pub(super) fn merge(args: &MergeArgs) -> anyhow::Result<Status> {
     args.outputs.finish(&experiment, &course, &totals, runs, &sources)
 }
 
-/// Whether a file is or will be at this place that can be written again: no device, no pipe.
-fn is_ordinary(path: &Path) -> bool {
-    path.is_file() || !path.exists()
-}
-
 impl Outputs {
-    /// No output, among them the table of every step, is an input or another output.
-    fn check(&self, inputs: &[&Path], every_step: &Option<PathBuf>) -> anyhow::Result<()> {
+    /// All outputs, among them the table of every step, can be written; `kind`: what -o is.
+    fn check(&self, inputs: &[&Path], kind: Kind, every_step: &Option<PathBuf>) -> anyhow::Result<()> {
         if self.confirm > MAX_REPLICATES {
             bail!("--confirm {}: expected at most {MAX_REPLICATES} experiments", self.confirm);
         }
-        let outputs =
-            [("-o", &self.output), ("--junit", &self.junit), ("--report", &self.report), ("--every-step", every_step)];
-        refuse_same_output(&outputs)?;
-        for output in outputs.iter().filter_map(|(_, path)| path.as_ref()) {
-            inputs.iter().try_for_each(|input| atomic::check_output(output, input))?;
-        }
-        Ok(())
+        let outputs = [
+            ("-o", &self.output, kind),
+            ("--junit", &self.junit, Kind::Xml),
+            ("--report", &self.report, Kind::Html),
+            ("--every-step", every_step, Kind::Table),
+        ];
+        files::check(&outputs, inputs)
     }
 
     /// Every plan names a parameter and a factor: better known before the runs than after.
@@ -371,12 +374,12 @@ impl Outputs {
             atomic::write(path, page.to_html()?.as_bytes())?;
         }
         if self.json {
-            print_text(&json)?;
+            print_text(&json);
         } else {
             let power = if self.power { text::power(&outcome) } else { String::new() };
-            print_text(&format!("{power}{planned}{}", text::outcome(&outcome)))?;
+            print_text(&format!("{power}{planned}{}", text::outcome(&outcome)));
         }
-        Ok(status(&outcome))
+        Ok(self.judging.status([outcome.verdict]))
     }
 }
 
@@ -467,11 +470,4 @@ fn planned<'a>(
         .filter(|f| f.is_finite() && *f > 0.0 && *f != 1.0 && (1e-3..=1e3).contains(f))
         .with_context(expected)?;
     Ok((number, what, size, text))
-}
-
-fn status(outcome: &Outcome) -> Status {
-    match outcome.verdict {
-        Verdict::Inconsistent => Status::CheckFailed,
-        Verdict::Consistent | Verdict::Inconclusive => Status::Done,
-    }
 }

@@ -1,60 +1,66 @@
 //! Tables, JSON, progress: how every command speaks.
 
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::io::{ErrorKind, IsTerminal, Write};
+use std::sync::OnceLock;
 
-use anyhow::bail;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
+use crate::export::atomic::in_words;
 use crate::params::{AxisParams, Params};
 use crate::replay::axes::RATE_TOLERANCE;
 pub use crate::units::digits;
 use crate::units::{Quantity, Unit};
 
+/// Why stdout did not take all that was meant for it.
+static LOST: OnceLock<String> = OnceLock::new();
+
 /// One machine-readable document on stdout.
 pub fn print_json<T: Serialize>(value: &T) -> anyhow::Result<()> {
     let mut text = serde_json::to_string_pretty(value)?;
     text.push('\n');
-    print_text(&text)
+    print_text(&text);
+    Ok(())
 }
 
-/// Text on stdout; a closed pipe comes back as an error that `main` treats as success.
-pub fn print_text(text: &str) -> anyhow::Result<()> {
+/// Text on stdout. Nothing here changes what the work has found: see [`exit_status`].
+pub fn print_text(text: &str) {
     let mut out = std::io::stdout().lock();
-    out.write_all(text.as_bytes())?;
-    out.flush()?;
-    Ok(())
-}
-
-/// Refuses, before the work, two outputs of one name. A device or a pipe (`/dev/null`) may take several. `outputs`: with their flags.
-pub fn refuse_same_output(outputs: &[(&str, &Option<PathBuf>)]) -> anyhow::Result<()> {
-    let mut files: Vec<(&str, PathBuf)> = Vec::new();
-    for (flag, path) in outputs.iter().filter_map(|(flag, path)| Some((*flag, path.as_deref()?))) {
-        if path.exists() && !path.is_file() {
-            continue;
-        }
-        let place = place(path);
-        if let Some((first, _)) = files.iter().find(|(_, other)| *other == place) {
-            bail!("{}: named by both {first} and {flag}; give them different names", path.display());
-        }
-        files.push((flag, place));
+    let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    if let Err(error) = written
+        // a reader that has seen enough is no error
+        && error.kind() != ErrorKind::BrokenPipe
+    {
+        let _ = LOST.set(in_words(&error));
     }
-    Ok(())
 }
 
-/// Where a file is, or will be: links followed, `./` left out.
-fn place(path: &Path) -> PathBuf {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let new = || Some(folder.canonicalize().ok()?.join(path.file_name()?));
-    path.canonicalize().ok().or_else(new).unwrap_or_else(|| path.to_path_buf())
+/// A line on stderr. Who does not listen misses it.
+pub fn say(line: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "{line}");
 }
 
-/// True when the reader of our stdout went away.
-pub fn is_broken_pipe(error: &anyhow::Error) -> bool {
-    error
-        .chain()
-        .any(|e| e.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe))
+/// The same of several lines, each with its end.
+pub fn say_all(lines: &str) {
+    lines.lines().for_each(say);
+}
+
+/// The help of clap, coloured for a terminal.
+pub fn print_help(help: &clap::Error) {
+    let text = help.render();
+    print_text(&if std::io::stdout().is_terminal() { text.ansi().to_string() } else { text.to_string() });
+}
+
+/// The status of the work, whatever became of what it said. Only where the work was done (0) and its text is lost for want of space, the
+/// work is one that could not be done (2).
+pub fn exit_status(work: u8) -> u8 {
+    match (work, LOST.get()) {
+        (0, Some(reason)) => {
+            say(&format!("kfdesign: stdout: cannot write: {reason}"));
+            2
+        }
+        _ => work,
+    }
 }
 
 /// Seconds below two minutes, minutes below two hours, hours below a thousand of them, else days.

@@ -7,7 +7,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::Status;
-use super::output::{digits, duration, notes_of_rate, print_json, print_text, table};
+use super::files::{self, Kind};
+use super::output::{digits, duration, notes_of_rate, print_json, print_text, say_all, table};
 use crate::export::atomic;
 use crate::identify::plan::{LONGEST_S, Planned, Sampling, Thinning};
 use crate::noise::NoiseModel;
@@ -110,9 +111,7 @@ struct Hours {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
-    if let Some(output) = &args.output {
-        atomic::check_output(output, &args.params)?;
-    }
+    files::check(&[("-o", &args.output, Kind::Json)], &[&args.params])?;
     let params = Params::read(&args.params)?;
     let precision = share(&args.precision)?;
     let rate_hz = args.rate.unwrap_or(params.sample_rate_hz);
@@ -125,7 +124,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
             .check_rate(1.0 / rate_hz)
             .with_context(|| format!("{}: axis {}", args.params.display(), axis.name))?;
     }
-    eprint!("{}", notes_of_rate(&params, &chosen, rate_hz));
+    say_all(&notes_of_rate(&params, &chosen, rate_hz));
     // axes alike are planned once
     let mut unlike: Vec<&AxisParams> = Vec::new();
     for axis in &chosen {
@@ -157,7 +156,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if args.json {
         print_json(&document)?;
     } else {
-        print_text(&text(&document))?;
+        print_text(&text(&document));
     }
     Ok(if axes.iter().all(|axis| axis.duration_s.is_some()) { Status::Done } else { Status::CheckFailed })
 }

@@ -3,19 +3,19 @@
 mod attitude;
 mod sight;
 
-use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::Context;
 
-use super::Status;
 use super::aid_columns::aid_columns;
+use super::files::{self, Kind};
 use super::flags::with_unit;
 use super::log_flags::{LogFlags, print_check};
-use super::output::{digits, print_json, print_text, progress, refuse_same_output, shown_unit, table};
+use super::output::{digits, print_json, print_text, progress, say, shown_unit, table};
 use super::tests_table::{TESTS, caption, rows};
-use crate::consistency::{Test, Verdict};
-use crate::export::atomic::{AtomicFile, refuse_input_as_output};
+use super::{Status, VerdictFlags};
+use crate::consistency::Test;
+use crate::export::atomic;
 use crate::export::table::TableWriter;
 use crate::filter::{AttitudeDesign, FilterDesign, Form};
 use crate::identify::Followed;
@@ -25,8 +25,8 @@ use crate::units::{Dimension, Quantity, Unit};
 
 /// A recorded log through filter.json, with a verdict
 ///
-/// Exit status 1 only when the verdict is inconsistent. Inconclusive (a log too short to judge the drift) is no failed
-/// check: it exits 0 and says so.
+/// Exit status 1 when the verdict is inconsistent, and when it is inconclusive (a log too short to judge the drift) unless
+/// --allow-inconclusive.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: kfdesign replay filter.json log.csv -o estimates.csv --innovations")]
 pub struct Args {
@@ -75,6 +75,8 @@ pub struct Args {
     #[arg(long, value_name = "NAME=COLUMN")]
     aid: Vec<String>,
     #[command(flatten)]
+    judging: VerdictFlags,
+    #[command(flatten)]
     attitude: attitude::Flags,
     #[command(flatten)]
     reading: LogFlags,
@@ -103,16 +105,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         follow: args.follow.as_deref().map(|text| with_unit("--follow", text, Dimension::TIME, "1000s")).transpose()?,
     };
     options.check()?;
-    refuse_same_output(&[("-o", &args.output), ("--report", &args.report), ("--plot", &args.plot)])?;
+    let outputs =
+        [("-o", &args.output, Kind::Table), ("--report", &args.report, Kind::Html), ("--plot", &args.plot, Kind::Svg)];
+    files::check(&outputs, &[&args.filter, &args.log])?;
     if AttitudeDesign::is(&args.filter) {
         return attitude::run(args);
     }
     args.attitude.refuse()?;
     let design = FilterDesign::read(&args.filter)?;
-    for output in [&args.output, &args.report, &args.plot].into_iter().flatten() {
-        refuse_input_as_output(output, &args.log)?;
-        refuse_input_as_output(output, &args.filter)?;
-    }
     let extra = aid_columns(&args.aid, &design).with_context(|| args.filter.display().to_string())?;
     let extra_columns = extra.len();
     let mut reader = LogReader::open(&args.log, &LogOptions { extra, ..args.reading.rates()? })?;
@@ -131,9 +131,6 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     };
     let replayer = Replayer::new(&design, &shape, options).with_context(|| name.clone())?;
     say_assignment(&design, &replayer, &shape);
-    // opened before the work, so that a place that cannot be written is told at once
-    let create = |path: &Option<PathBuf>| path.as_deref().map(AtomicFile::create).transpose();
-    let (report, plot) = (create(&args.report)?, create(&args.plot)?);
     let mut result = stream(args, &design, replayer, &mut reader)?;
     result.log = Some(name);
     result.log_sha256 = Some(reader.sha256().to_string());
@@ -142,24 +139,19 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         say_follow(args, &result);
     }
     let unit = reader.axes().first().map(|a| a.unit.clone());
-    if let Some(mut file) = plot {
-        file.write_all(sight::sheet(&result, unit.as_ref()).as_bytes()).context("plot")?;
-        file.commit()?;
+    if let Some(path) = &args.plot {
+        atomic::write(path, sight::sheet(&result, unit.as_ref()).as_bytes())?;
     }
-    if let Some(mut file) = report {
+    if let Some(path) = &args.report {
         let page = sight::page(&result, &args.filter.display().to_string(), unit.as_ref());
-        file.write_all(page.to_html()?.as_bytes()).context("report")?;
-        file.commit()?;
+        atomic::write(path, page.to_html()?.as_bytes())?;
     }
     if args.json {
         print_json(&result)?;
     } else {
-        print_text(&text(&result, unit.as_ref()))?;
+        print_text(&text(&result, unit.as_ref()));
     }
-    Ok(match result.verdict {
-        Verdict::Inconsistent => Status::CheckFailed,
-        Verdict::Consistent | Verdict::Inconclusive => Status::Done,
-    })
+    Ok(args.judging.status([result.verdict]))
 }
 
 /// One line on stderr for an aid that comes at another rate than the filter was made for.
@@ -169,27 +161,27 @@ fn say_rates(design: &FilterDesign, result: &ReplayResult) {
         let expected = (axis.samples / *every as u64).max(1) as f64;
         let ratio = (axis.accepted + axis.rejected) as f64 / expected;
         if *every > 1 && !(0.5..=2.0).contains(&ratio) {
-            eprintln!(
+            say(&format!(
                 "  warning: {} has {} measurements in {} rows, the filter was made for one in {every}; empty the rows that repeat an \
                  older value, or tune with the aid's true rate",
                 axis.measurement,
                 axis.accepted + axis.rejected,
                 axis.samples
-            );
+            ));
         }
     }
 }
 
 /// One line on stderr when the wideband noise of a log at rest is not that of the design.
 fn say_follow(args: &Args, result: &ReplayResult) {
-    let other = |test: &&Test| !test.pass && ["nis", "whiteness"].contains(&test.name.as_str());
+    let other = |test: &&Test| !test.pass() && ["nis", "whiteness"].contains(&test.name.as_str());
     let mut axes: Vec<&str> = result.tests.iter().filter(other).map(|test| test.axis.as_str()).collect();
     axes.dedup();
     if !axes.is_empty() && args.follow.is_none() && args.form == FormFlag::Joseph && !args.smooth {
-        eprintln!(
+        say(&format!(
             "  note: the wideband noise is not what the design says ({}): --follow DURATION finds it anew as the log goes on",
             axes.join(", ")
-        );
+        ));
     }
 }
 
@@ -205,10 +197,10 @@ fn say_assignment(design: &FilterDesign, replayer: &Replayer, log: &LogShape) {
     let left_out: Vec<&str> =
         log.axes.iter().filter(|a| !replayer.log_axes().contains(a)).map(String::as_str).collect();
     if !pairs.is_empty() {
-        eprintln!("  note: {}", pairs.join(", "));
+        say(&format!("  note: {}", pairs.join(", ")));
     }
     if !left_out.is_empty() {
-        eprintln!("  note: not in the filter, left out: {}", left_out.join(", "));
+        say(&format!("  note: not in the filter, left out: {}", left_out.join(", ")));
     }
 }
 

@@ -6,10 +6,10 @@ use anyhow::{Context, anyhow, bail};
 use serde::Serialize;
 
 use super::Status;
+use super::files::{self, Kind};
 use super::flags::{whole, with_unit};
-use super::output::{digits, notes_of_rate, print_json, print_text, progress, shown_unit, table};
+use super::output::{digits, notes_of_rate, print_json, print_text, progress, say_all, shown_unit, table};
 use super::tune::plant_flags::PlantFlags;
-use crate::export::atomic;
 use crate::export::table::TableWriter;
 use crate::input::{self, LogOptions};
 use crate::numerics::reduce::Moments;
@@ -100,10 +100,12 @@ struct AxisSummary {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
+    let motion = args.true_rate.strip_prefix("file:").map(Path::new);
+    let inputs: Vec<&Path> = std::iter::once(args.params.as_path()).chain(motion).collect();
+    files::check(&[("-o", &Some(args.output.clone()), Kind::Table)], &inputs)?;
     let params = Params::read(&args.params)?;
-    atomic::refuse_input_as_output(&args.output, &args.params)?;
     let scenario = scenario(args, &params)?;
-    eprint!("{}", notes_of_rate(&params, &params.axes.iter().collect::<Vec<_>>(), scenario.rate_hz));
+    say_all(&notes_of_rate(&params, &params.axes.iter().collect::<Vec<_>>(), scenario.rate_hz));
     let unit = match &args.unit {
         None => display_unit(&params)?,
         Some(text) => {
@@ -192,7 +194,8 @@ fn report(args: &Args, summary: &Summary) -> anyhow::Result<()> {
         summary.seed,
         summary.run
     );
-    print_text(&format!("{}{sentence}", table(&header, &rows)))
+    print_text(&format!("{}{sentence}", table(&header, &rows)));
+    Ok(())
 }
 
 fn count_saturated(block: &AxisBlock, scenario: &Scenario) -> u64 {
@@ -206,7 +209,7 @@ fn scenario(args: &Args, params: &Params) -> anyhow::Result<Scenario> {
         bail!("--rate {rate_hz}: expected a positive number of Hz");
     }
     let dimension = params.quantity.dimension();
-    let true_rate = true_rate(&args.true_rate, args, params, rate_hz)?;
+    let true_rate = true_rate(&args.true_rate, params, rate_hz)?;
     let samples = match (&args.duration, &true_rate) {
         (Some(text), _) => {
             let duration_s = with_unit("--duration", text, Dimension::TIME, "2h")?;
@@ -242,7 +245,7 @@ fn scenario(args: &Args, params: &Params) -> anyhow::Result<Scenario> {
     Ok(scenario)
 }
 
-fn true_rate(text: &str, args: &Args, params: &Params, rate_hz: f64) -> anyhow::Result<TrueRate> {
+fn true_rate(text: &str, params: &Params, rate_hz: f64) -> anyhow::Result<TrueRate> {
     let dimension = params.quantity.dimension();
     let expected =
         || anyhow!("--true-rate {text}: expected rest, constant:1deg/s, sine:10deg/s,0.5Hz or file:RATE.csv");
@@ -262,7 +265,6 @@ fn true_rate(text: &str, args: &Args, params: &Params, rate_hz: f64) -> anyhow::
         }
         ("file", path) => {
             let path = Path::new(path);
-            atomic::refuse_input_as_output(&args.output, path)?;
             let options =
                 LogOptions { rate_hz: Some(rate_hz), quantity: Some(params.quantity), ..LogOptions::default() };
             let (recording, _) = input::read(path, &options)?;

@@ -19,10 +19,11 @@ use serde_json::json;
 use self::logs::Reading;
 use self::objective::{ObjectiveArg, ObjectiveFlags};
 use self::plant_flags::PlantFlags;
-use super::Status;
+use super::files::{self, Kind};
 use super::flags::whole;
 use super::log_flags::LogFlags;
-use super::output::{print_json, print_text, progress, refuse_same_output};
+use super::output::{print_json, print_text, progress, say};
+use super::{Status, VerdictFlags};
 use crate::consistency::Verdict;
 use crate::export::atomic;
 use crate::montecarlo::{Outcome, Plan, verify};
@@ -72,6 +73,8 @@ pub struct Args {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
+    judging: VerdictFlags,
+    #[command(flatten)]
     choosing: ObjectiveFlags,
     #[command(flatten)]
     plant: PlantFlags,
@@ -103,12 +106,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
             return compare::run(&args.choosing.compare, args.choosing.held_out, args.json, &options, &reading);
         }
     };
-    refuse_same_output(&[("-o", &args.output), ("--report", &args.report), ("--plot", &args.plot)])?;
-    for output in [&args.output, &args.report, &args.plot].into_iter().flatten() {
-        for input in std::iter::once(params_path).chain(&args.log).chain(&args.truth) {
-            atomic::check_output(output, input)?;
-        }
-    }
+    let outputs =
+        [("-o", &args.output, Kind::Json), ("--report", &args.report, Kind::Html), ("--plot", &args.plot, Kind::Svg)];
+    let inputs: Vec<&Path> =
+        std::iter::once(params_path).chain(&args.log).chain(&args.truth).map(PathBuf::as_path).collect();
+    files::check(&outputs, &inputs)?;
     let params = Params::read(params_path)?;
     let name = params_path.display().to_string();
     let design = args.plant.design(&params)?;
@@ -170,10 +172,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         if let Some(output) = &args.output {
             printed.push_str(&written(output, verified));
         }
-        print_text(&printed)?;
+        print_text(&printed);
     }
-    let contradicted = replays.iter().any(|r| r.verdict == Verdict::Inconsistent);
-    Ok(if verified && !contradicted { Status::Done } else { Status::CheckFailed })
+    Ok(if verified { args.judging.status(replays.iter().map(|r| r.verdict)) } else { Status::CheckFailed })
 }
 
 /// What `--truth` asks for.
@@ -215,8 +216,8 @@ fn chosen(
         for log in &args.log {
             let (read, sha256) = reading.read(log, &nominal.design)?;
             if flags.objective == ObjectiveArg::Likelihood && !flags.no_prior && own.as_ref() == Some(&sha256) {
-                eprintln!(
-                    "  warning: the intervals come from this log, which now counts twice; give another one, or --no-prior"
+                say(
+                    "  warning: the intervals come from this log, which now counts twice; give another one, or --no-prior",
                 );
             }
             logs.push(read);

@@ -320,7 +320,7 @@ fn meaning(verdict: Verdict, alpha: f64, tests: &[Test], axes: &[AxisComparison]
         said.collect::<Vec<_>>().join(". ")
     };
     match verdict {
-        Verdict::Inconsistent => tell(&|t| !t.pass),
+        Verdict::Inconsistent => tell(&|t| !t.pass()),
         Verdict::Inconclusive if !short.is_empty() => short.join(". "),
         Verdict::Inconclusive => format!(
             "deviations are real but the log is too short to tell whether they matter: {}",

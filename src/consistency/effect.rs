@@ -53,20 +53,14 @@ impl Effect {
 /// 3. significant, the estimate within the tolerance: passes, since the deviation is real but small; if the interval still
 ///    reaches beyond the tolerance, the log cannot tell whether it is small, and the test is undecided.
 ///
-/// Any failure makes the verdict inconsistent. Otherwise it is inconclusive when a test is undecided, has no p-value, or when
+/// Any failure makes the verdict inconsistent. Otherwise it is inconclusive when a test is undecided, has no numbers, or when
 /// `enough` is false (the log is too short for the drift to be judged); else consistent.
 /// Under a true design the probability of "inconsistent" is at most `alpha`; the effect can only lower it.
 pub fn judge(tests: &mut [Test], alpha: f64, enough: bool) -> Verdict {
-    multiplicity::adjust(tests);
-    let mut failed = false;
-    let mut undecided = !enough || tests.is_empty();
-    for test in tests.iter_mut() {
-        let significant = test.adjusted_p_value < alpha;
-        let beyond = test.effect.as_ref().is_none_or(Effect::is_beyond);
-        test.pass = !(significant && beyond);
-        failed |= !test.pass;
-        undecided |= is_undecided(test, alpha);
-    }
+    let beyond = |test: &Test| test.effect.as_ref().is_none_or(Effect::is_beyond);
+    multiplicity::judge_each(tests, |test| test.adjusted_p_value >= alpha || !beyond(test));
+    let failed = tests.iter().any(|test| test.has_numbers() && !test.pass());
+    let undecided = !enough || tests.is_empty() || tests.iter().any(|test| is_undecided(test, alpha));
     match (failed, undecided) {
         (true, _) => Verdict::Inconsistent,
         (false, true) => Verdict::Inconclusive,
@@ -74,8 +68,8 @@ pub fn judge(tests: &mut [Test], alpha: f64, enough: bool) -> Verdict {
     }
 }
 
-/// A judged test that could not tell: no p-value, or a sure deviation whose size may or may not matter.
+/// A judged test that could not tell: no numbers, or a sure deviation whose size may or may not matter.
 pub fn is_undecided(test: &Test, alpha: f64) -> bool {
     let unsure = !test.effect.as_ref().is_some_and(Effect::is_surely_small);
-    test.adjusted_p_value.is_nan() || (test.pass && test.adjusted_p_value < alpha && unsure)
+    !test.has_numbers() || (test.pass() && test.adjusted_p_value < alpha && unsure)
 }

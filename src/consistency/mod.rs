@@ -40,6 +40,9 @@ impl Verdict {
     }
 }
 
+/// Of a test whose statistic or p-value is none.
+const NO_NUMBER: &str = "its numbers are too large to be computed, or missing: nothing can be said";
+
 /// One test of one axis.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Test {
@@ -55,7 +58,8 @@ pub struct Test {
     pub p_value: f64,
     /// Over all tests and axes of the document: Holm (replay), law of the least p-value (montecarlo).
     pub adjusted_p_value: f64,
-    pub pass: bool,
+    /// Written by [`Test::judge`] alone.
+    pass: bool,
     /// A sentence.
     pub meaning: String,
     /// Averaging time of a low-frequency test, s.
@@ -67,9 +71,10 @@ pub struct Test {
 }
 
 impl Test {
-    /// A test not yet judged: `adjusted_p_value` is the p-value and `pass` is true until [`multiplicity::judge`] or
-    /// [`effect::judge`] has seen all tests of the document.
+    /// A test not yet judged: `adjusted_p_value` is the p-value and it does not pass until [`multiplicity::judge`] or
+    /// [`effect::judge`] has seen all tests of the document. Without a number for its statistic or its p-value it means nothing, and says so.
     pub fn new(axis: &str, name: &str, statistic: f64, bounds: [f64; 2], p_value: f64, meaning: String) -> Test {
+        let meaning = if statistic.is_finite() && !p_value.is_nan() { meaning } else { NO_NUMBER.to_string() };
         Test {
             axis: axis.to_string(),
             name: name.to_string(),
@@ -78,11 +83,27 @@ impl Test {
             upper: bounds[1],
             p_value,
             adjusted_p_value: p_value,
-            pass: true,
+            pass: false,
             meaning,
             averaging_s: None,
             effect: None,
         }
+    }
+
+    /// Whether the design passes this test.
+    pub fn pass(&self) -> bool {
+        self.pass
+    }
+
+    /// Whether there are numbers to judge.
+    pub fn has_numbers(&self) -> bool {
+        self.statistic.is_finite() && !self.p_value.is_nan() && !self.adjusted_p_value.is_nan()
+    }
+
+    /// The verdict on this test, from its adjusted p-value: what has no number never passes.
+    pub(crate) fn judge(&mut self, adjusted_p_value: f64, pass: impl FnOnce(&Test) -> bool) {
+        self.adjusted_p_value = adjusted_p_value;
+        self.pass = self.has_numbers() && pass(self);
     }
 
     #[must_use]

@@ -19,24 +19,19 @@ pub fn holm(p_values: &[f64]) -> Vec<f64> {
     adjusted
 }
 
-/// Writes Holm's adjusted p-values into the tests; nothing else changes.
-pub fn adjust(tests: &mut [Test]) {
+/// Holm's adjusted p-values of the tests, each judged by `pass`.
+pub(super) fn judge_each(tests: &mut [Test], pass: impl Fn(&Test) -> bool) {
     let p_values: Vec<f64> = tests.iter().map(|t| t.p_value).collect();
-    for (test, adjusted) in tests.iter_mut().zip(holm(&p_values)) {
-        test.adjusted_p_value = adjusted;
-    }
+    tests.iter_mut().zip(holm(&p_values)).for_each(|(test, adjusted)| test.judge(adjusted, &pass));
 }
 
 /// Judges by p-values alone, as is right for simulated data: a test passes when its adjusted p-value is at least `alpha`, and
 /// the whole is inconsistent when any test fails. The family-wise false-alarm probability is at most `alpha`.
 pub fn judge(tests: &mut [Test], alpha: f64) -> Verdict {
-    adjust(tests);
-    for test in tests.iter_mut() {
-        test.pass = !test.adjusted_p_value.is_nan() && test.adjusted_p_value >= alpha;
-    }
-    if tests.is_empty() || tests.iter().any(|t| t.adjusted_p_value.is_nan()) {
+    judge_each(tests, |test| test.adjusted_p_value >= alpha);
+    if tests.is_empty() || tests.iter().any(|t| !t.has_numbers()) {
         Verdict::Inconclusive
-    } else if tests.iter().all(|t| t.pass) {
+    } else if tests.iter().all(Test::pass) {
         Verdict::Consistent
     } else {
         Verdict::Inconsistent

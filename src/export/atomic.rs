@@ -1,12 +1,13 @@
-//! Files that appear whole or not at all: a temporary file beside the target, renamed on success.
+//! Files that appear whole or not at all: a temporary file beside the target, on the disk before it is renamed.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use tempfile::NamedTempFile;
+use tempfile::TempPath;
 
-#[derive(Debug, thiserror::Error)]
+#[derive(Clone, Debug, thiserror::Error)]
 #[error("{path}: cannot write: {reason}")]
 pub struct WriteError {
     pub path: String,
@@ -31,20 +32,64 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
 pub fn refuse_input_as_output(output: &Path, input: &Path) -> Result<(), WriteError> {
     match (fs::canonicalize(output), fs::canonicalize(input)) {
         (Ok(output_file), Ok(input_file)) if output_file == input_file => {
-            Err(WriteError::new(output, "it is the input file; give -o another name"))
+            Err(WriteError::new(output, "it is the input file; give it another name"))
         }
         _ => Ok(()),
     }
 }
 
-/// Says before the work what would be said after it: the output is the input file, or cannot be written. Nothing is left behind.
-pub fn check_output(output: &Path, input: &Path) -> Result<(), WriteError> {
-    refuse_input_as_output(output, input)?;
+/// Says before the work what would be said after it: the output cannot be written. Nothing is left behind.
+pub fn check_output(output: &Path) -> Result<(), WriteError> {
     // a pipe is not opened twice: its reader would take the first end for the only one
     if fs::metadata(output).map_or(true, |target| target.is_file()) {
         drop(AtomicFile::create(output)?);
     }
     Ok(())
+}
+
+/// The temporary files that are there now. Held while one is made, moved or removed, so that who holds it knows them all.
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// For a process that ends at a signal: removes every temporary file and lets no other come to be, nor any reach its place.
+pub fn abandon() {
+    let files = unfinished();
+    files.iter().for_each(|file| drop(fs::remove_file(file)));
+    // whoever wants to make or move one waits for the end
+    std::mem::forget(files);
+}
+
+/// A temporary file's name; removed when dropped.
+#[derive(Debug)]
+struct Unfinished(Option<TempPath>);
+
+impl Unfinished {
+    fn create(builder: &mut tempfile::Builder<'_, '_>, folder: &Path) -> io::Result<(File, Unfinished)> {
+        let mut all = unfinished();
+        let (file, path) = builder.tempfile_in(folder)?.into_parts();
+        all.push(path.to_path_buf());
+        Ok((file, Unfinished(Some(path))))
+    }
+
+    fn persist(mut self, place: &Path) -> io::Result<()> {
+        self.end(|path| path.persist(place).map_err(|e| e.error))
+    }
+
+    fn end(&mut self, how: impl FnOnce(TempPath) -> io::Result<()>) -> io::Result<()> {
+        let mut all = unfinished();
+        let Some(path) = self.0.take() else { return Ok(()) };
+        all.retain(|other| *other != *path);
+        how(path)
+    }
+}
+
+impl Drop for Unfinished {
+    fn drop(&mut self) {
+        let _ = self.end(TempPath::close);
+    }
 }
 
 /// A file in the making; nothing appears at its path before [`AtomicFile::commit`], and a dropped one leaves nothing behind.
@@ -58,12 +103,14 @@ pub struct AtomicFile {
 
 #[derive(Debug)]
 enum Target {
-    /// Temporary file and the place it will be moved to.
-    Renamed(BufWriter<NamedTempFile>, PathBuf),
+    /// Temporary file, its name, and the place it will be moved to.
+    Renamed(BufWriter<File>, Unfinished, PathBuf),
     Direct(BufWriter<File>),
 }
 
 const BUFFER: usize = 1 << 16;
+/// Links that lead to links, as many as Linux follows.
+const MOST_LINKS: usize = 40;
 
 impl AtomicFile {
     pub fn create(path: &Path) -> Result<AtomicFile, WriteError> {
@@ -76,9 +123,7 @@ impl AtomicFile {
                 let file = File::options().write(true).open(path).map_err(|e| io_error(path, &e))?;
                 Target::Direct(BufWriter::with_capacity(BUFFER, file))
             }
-            // a link is followed, so that the file it names is replaced and not the link
-            Ok(_) => temporary(path, fs::canonicalize(path).map_err(|e| io_error(path, &e))?)?,
-            Err(_) => temporary(path, path.to_path_buf())?,
+            _ => temporary(path, place(path).ok_or_else(|| WriteError::new(path, "its links lead in a circle"))?)?,
         };
         Ok(AtomicFile { path: path.to_path_buf(), target })
     }
@@ -88,50 +133,76 @@ impl AtomicFile {
         &self.path
     }
 
-    /// Overwrites bytes already written, then returns to the end.
-    pub fn patch(&mut self, offset: u64, bytes: &[u8]) -> io::Result<()> {
+    fn file(&mut self) -> &mut BufWriter<File> {
         match &mut self.target {
-            Target::Renamed(file, _) => patch(file, offset, bytes),
-            Target::Direct(file) => patch(file, offset, bytes),
+            Target::Renamed(file, ..) | Target::Direct(file) => file,
         }
     }
 
-    /// Moves the finished file to its place.
+    /// Overwrites bytes already written, then returns to the end.
+    pub fn patch(&mut self, offset: u64, bytes: &[u8]) -> io::Result<()> {
+        let file = self.file();
+        let patched = file
+            .seek(SeekFrom::Start(offset))
+            .and_then(|_| file.write_all(bytes))
+            .and_then(|()| file.seek(SeekFrom::End(0)));
+        patched.map(|_| ()).map_err(|e| self.told(&e))
+    }
+
+    /// Moves the finished file to its place, with the mode of the file that was there. It is on the disk before it has its name, so that
+    /// also after a power failure the old file is there or the whole new one.
     pub fn commit(self) -> Result<(), WriteError> {
         let path = self.path;
-        match self.target {
-            Target::Direct(mut file) => file.flush().map_err(|e| io_error(&path, &e)),
-            Target::Renamed(file, place) => {
-                let file = file.into_inner().map_err(|e| io_error(&path, e.error()))?;
-                file.persist(&place).map(|_| ()).map_err(|e| io_error(&path, &e.error))
-            }
-        }
+        let done = match self.target {
+            Target::Direct(mut file) => file.flush(),
+            Target::Renamed(file, name, place) => file.into_inner().map_err(|e| e.into_error()).and_then(|file| {
+                if let Ok(old) = fs::metadata(&place) {
+                    // a file system without modes has none to keep
+                    let _ = file.set_permissions(old.permissions());
+                }
+                file.sync_all()?;
+                drop(file);
+                name.persist(&place)?;
+                // the new name is in the folder, which some file systems do not let be flushed
+                let _ = File::open(folder_of(&place)).and_then(|folder| folder.sync_all());
+                Ok(())
+            }),
+        };
+        done.map_err(|e| io_error(&path, &e))
+    }
+
+    /// The error as one of the path that was asked for, in words.
+    fn told(&self, error: &io::Error) -> io::Error {
+        io::Error::new(error.kind(), io_error(&self.path, error))
     }
 }
 
 impl Write for AtomicFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        match &mut self.target {
-            Target::Renamed(file, _) => file.write(bytes),
-            Target::Direct(file) => file.write(bytes),
-        }
+        self.file().write(bytes).map_err(|e| self.told(&e))
     }
     fn flush(&mut self) -> io::Result<()> {
-        match &mut self.target {
-            Target::Renamed(file, _) => file.flush(),
-            Target::Direct(file) => file.flush(),
-        }
+        self.file().flush().map_err(|e| self.told(&e))
     }
 }
 
-fn patch<F: Write + Seek>(file: &mut F, offset: u64, bytes: &[u8]) -> io::Result<()> {
-    file.seek(SeekFrom::Start(offset))?;
-    file.write_all(bytes)?;
-    file.seek(SeekFrom::End(0)).map(|_| ())
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Where a file is or will be: links are followed, also to where nothing is yet. None where they never end.
+pub fn place(path: &Path) -> Option<PathBuf> {
+    let mut place = path.to_path_buf();
+    for _ in 0..MOST_LINKS {
+        match fs::read_link(&place) {
+            Ok(target) => place = folder_of(&place).join(target),
+            Err(_) => return Some(place),
+        }
+    }
+    None
 }
 
 fn temporary(path: &Path, place: PathBuf) -> Result<Target, WriteError> {
-    let folder = place.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if fs::metadata(&place).is_ok_and(|m| m.permissions().readonly()) {
         return Err(WriteError::new(path, "the file is there and may not be written"));
     }
@@ -143,24 +214,42 @@ fn temporary(path: &Path, place: PathBuf) -> Result<Target, WriteError> {
         // an ordinary file: the umask takes away what it takes from any other
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
-    let file = builder.tempfile_in(folder).map_err(|e| io_error(path, &e))?;
-    Ok(Target::Renamed(BufWriter::with_capacity(BUFFER, file), place))
+    // where a link leads is told by its own folder
+    let asked = if place == path { path } else { &place };
+    let (file, name) = Unfinished::create(&mut builder, folder_of(&place))
+        .map_err(|e| WriteError { path: path.display().to_string(), ..io_error(asked, &e) })?;
+    Ok(Target::Renamed(BufWriter::with_capacity(BUFFER, file), name, place))
 }
 
-/// The operating system's words, with the folder named where that is what is wrong.
+/// The error in words, with the folder named where that is what is wrong.
 pub(super) fn io_error(path: &Path, error: &io::Error) -> WriteError {
-    let folder = path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let reason = match error.kind() {
-        ErrorKind::NotFound => format!("the folder '{}' does not exist", folder.display()),
-        ErrorKind::PermissionDenied => format!("no permission to write in the folder '{}'", folder.display()),
-        ErrorKind::NotADirectory => format!("'{}' is not a folder", folder.display()),
-        // a temporary file's error carries its random name: keep the first words only
-        _ => match error.raw_os_error() {
-            Some(code) => io::Error::from_raw_os_error(code).to_string(),
-            None => error.to_string(),
+    if let Some(told) = error.get_ref().and_then(|inner| inner.downcast_ref::<WriteError>()) {
+        return told.clone();
+    }
+    let folder = folder_of(path).display();
+    WriteError::new(
+        path,
+        match error.kind() {
+            ErrorKind::NotFound => format!("the folder '{folder}' does not exist"),
+            ErrorKind::PermissionDenied => format!("no permission to write in the folder '{folder}'"),
+            ErrorKind::NotADirectory => format!("'{folder}' is not a folder"),
+            _ => in_words(error),
         },
-    };
-    WriteError::new(path, reason)
+    )
+}
+
+/// What the operating system says of a write that failed, without its number, and without the random name that a temporary file's error has.
+pub fn in_words(error: &io::Error) -> String {
+    match error.kind() {
+        ErrorKind::StorageFull => "no space is left on the disk".into(),
+        ErrorKind::QuotaExceeded => "the disk quota is used up".into(),
+        ErrorKind::FileTooLarge => "the file is larger than it may be (ulimit -f)".into(),
+        _ => {
+            let inner = error.get_ref().and_then(|inner| inner.source()).and_then(|e| e.downcast_ref::<io::Error>());
+            let text = inner.unwrap_or(error).to_string();
+            text.split(" (os error").next().unwrap_or(&text).to_string()
+        }
+    }
 }
 
 #[cfg(test)]
@@ -219,6 +308,62 @@ mod tests {
         fs::create_dir(&detour).unwrap();
         assert!(refuse_input_as_output(&detour.join("../log.csv"), &log).is_err());
         assert!(refuse_input_as_output(&folder.path().join("new.csv"), &log).is_ok());
+    }
+
+    /// A link to a name without a file makes that file and stays a link; one that leads to itself, or into no folder, is told.
+    #[cfg(unix)]
+    #[test]
+    fn a_link_to_nothing_is_followed() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir(at("far")).unwrap();
+        symlink("far/second", at("first")).unwrap();
+        symlink("real", at("far/second")).unwrap();
+        write(&at("first"), b"new").unwrap();
+        assert_eq!(fs::read_to_string(at("far/real")).unwrap(), "new");
+        assert!(fs::symlink_metadata(at("first")).unwrap().is_symlink());
+        assert_eq!(names(&at("far")), ["real", "second"]);
+        symlink("circle", at("circle")).unwrap();
+        let error = write(&at("circle"), b"").unwrap_err().to_string();
+        assert!(error.ends_with("circle: cannot write: its links lead in a circle"), "{error}");
+        symlink("nowhere/x", at("lost")).unwrap();
+        let error = write(&at("lost"), b"").unwrap_err().to_string();
+        assert!(
+            error.contains("lost: cannot write: the folder '") && error.ends_with("nowhere' does not exist"),
+            "{error}"
+        );
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_replaced_file_keeps_its_mode() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.json");
+        for mode in [0o600, 0o640, 0o755] {
+            fs::write(&path, "old").unwrap();
+            fs::set_permissions(&path, fs::Permissions::from_mode(mode)).unwrap();
+            write(&path, b"new").unwrap();
+            assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, mode);
+        }
+    }
+
+    /// The system's own number and the name of the temporary file are no part of a message.
+    #[test]
+    fn errors_are_told_in_words_with_the_path_asked_for() {
+        let path = Path::new("out/a.csv");
+        let of = |code| io_error(path, &io::Error::from_raw_os_error(code)).to_string();
+        if cfg!(target_os = "linux") {
+            assert_eq!(of(28), "out/a.csv: cannot write: no space is left on the disk");
+            assert_eq!(of(122), "out/a.csv: cannot write: the disk quota is used up");
+            assert_eq!(of(5), "out/a.csv: cannot write: Input/output error");
+        }
+        let wrapped = io::Error::other(io_error(path, &ErrorKind::StorageFull.into()));
+        assert_eq!(
+            io_error(Path::new("other"), &wrapped).to_string(),
+            "out/a.csv: cannot write: no space is left on the disk"
+        );
     }
 
     #[cfg(unix)]

@@ -37,7 +37,7 @@ fn case(test: &Test) -> TestCase {
         "{}: statistic {}, expected {} to {}, p {}, family-wise p {}",
         test.meaning, test.statistic, test.lower, test.upper, test.p_value, test.adjusted_p_value
     );
-    let status = if test.pass {
+    let status = if test.pass() {
         TestCaseStatus::success()
     } else {
         let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);

@@ -50,6 +50,11 @@ fn format_of(path: &Path) -> Result<Format, WriteError> {
     }
 }
 
+/// Refuses a path whose ending is none of the formats.
+pub fn check_ending(path: &Path) -> Result<(), WriteError> {
+    format_of(path).map(|_| ())
+}
+
 impl TableWriter {
     /// `header`: column names with units, e.g. `gyro_x (deg/s)`. For npy: a structured 1-D array of f8 fields with these names.
     pub fn create(path: &Path, header: &[String]) -> Result<TableWriter, WriteError> {

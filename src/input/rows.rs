@@ -6,7 +6,7 @@ use super::InputError;
 use super::columns::Choice;
 use crate::numerics::reduce::by_eight;
 use crate::signal::check::Samples;
-use crate::units::Unit;
+use crate::units::{LARGEST, Unit};
 
 /// Rows of the selected columns as they stand in the file.
 #[derive(Debug, Default)]
@@ -79,6 +79,10 @@ impl Choice {
         let units = self.axes.iter().map(|axis| &axis.unit).chain(&self.extra).chain(beside);
         for (column, unit) in rows.values.iter_mut().zip(units) {
             to_si(unit, column);
+            // what no sensor gives would spoil every sum it enters
+            if column.iter().fold(false, |found, x| found | (x.abs() > LARGEST)) {
+                column.iter_mut().filter(|x| x.abs() > LARGEST).for_each(|x| *x = f64::INFINITY.copysign(*x));
+            }
         }
         // 0 x is NaN for what is not finite
         let empty = stamped && by_eight(&rows.time, |t| 0.0 * t) != 0.0;

@@ -384,8 +384,7 @@ pub(super) fn conclude(
     let own = &gate.axes[number];
     let tests = own.kinds.iter().enumerate().map(|(i, kind)| {
         let mut test = summary.test(i, *kind, own, gate.critical);
-        test.adjusted_p_value = gate.family(test.p_value);
-        test.pass = test.p_value > gate.critical;
+        test.judge(gate.family(test.p_value), |test| test.p_value > gate.critical);
         test
     });
     (summary.outcome(own, gate.critical), tests.collect())

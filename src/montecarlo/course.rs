@@ -38,6 +38,8 @@ const MIN_UPDATES: u64 = 2;
 #[derive(Clone, Debug)]
 pub struct AxisCourse {
     pub name: String,
+    /// Of the filter, s.
+    pub settling_s: f64,
     pub filter: LinearModel,
     /// The truth at its nominal parameters.
     pub truth: LinearModel,
@@ -169,6 +171,7 @@ impl AxisCourse {
         let layout = Layout::new(gains.epochs.len(), judge.size(), &channels);
         Ok(AxisCourse {
             name: design.name.clone(),
+            settling_s: design.steady_state.settling_time,
             filter,
             truth,
             gains,

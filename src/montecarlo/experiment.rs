@@ -10,6 +10,11 @@ use super::spread::Spread;
 use crate::filter::FilterDesign;
 use crate::params::{AxisParams, Params};
 
+/// Length of a run of a filter that settles within it, s.
+const USUAL_S: f64 = 600.0;
+/// A thousand runs of as many samples take minutes, not hours: ten times those of 600 s at 100 Hz.
+const MOST_BY_DEFAULT: f64 = 600_000.0;
+
 /// Everything that decides the numbers of every run.
 #[derive(Clone, Debug)]
 pub struct Experiment {
@@ -33,16 +38,6 @@ impl Experiment {
         if self.replicates > MAX_REPLICATES {
             let (value, expected) = (self.replicates as f64, format!("at most {MAX_REPLICATES}"));
             return Err(MonteCarloError::Plan { name: "replicates", value, expected });
-        }
-        let settling = self
-            .design
-            .axes
-            .iter()
-            .max_by(|a, b| a.steady_state.settling_time.total_cmp(&b.steady_state.settling_time));
-        let duration = self.steps as f64 / self.design.sample_rate_hz;
-        if let Some(axis) = settling.filter(|axis| axis.steady_state.settling_time > duration) {
-            let settling_s = axis.steady_state.settling_time;
-            return Err(MonteCarloError::Settling { axis: axis.name.clone(), duration_s: duration, settling_s });
         }
         let truths = self.truths()?;
         let mut axes = Vec::with_capacity(truths.len());
@@ -134,6 +129,15 @@ impl Experiment {
             replicates: whole("replicates")?,
         })
     }
+}
+
+/// Samples of a run where its length is not given: 600 s; for filters that settle more slowly twice the longest settling time, of those that
+/// this makes at most [`MOST_BY_DEFAULT`] samples. It depends on the design alone, so that more runs go on from fewer.
+pub fn default_steps(design: &FilterDesign) -> u64 {
+    let usual = USUAL_S * design.sample_rate_hz;
+    let settled = design.axes.iter().map(|axis| 2.0 * axis.steady_state.settling_time * design.sample_rate_hz);
+    let longest = settled.filter(|steps| *steps <= MOST_BY_DEFAULT && *steps > 2.0 * usual).fold(usual, f64::max);
+    (longest.ceil() as u64).clamp(MIN_STEPS, MAX_STEPS)
 }
 
 /// A course with given truths, one per axis.

@@ -65,11 +65,6 @@ pub enum MonteCarloError {
     #[error("{name} is {value}, expected {expected}")]
     Plan { name: &'static str, value: f64, expected: String },
     #[error(
-        "a run of {duration_s} s is shorter than the settling time of axis '{axis}', {settling_s:.4} s: nothing but the start would be judged; \
-         make the duration longer"
-    )]
-    Settling { axis: String, duration_s: f64, settling_s: f64 },
-    #[error(
         "axis '{axis}': measurement '{name}' is taken every {every} samples, but a run has {steps}; expected two in a run: make the duration \
          longer"
     )]
@@ -136,7 +131,7 @@ pub fn conclude(course: &Course, totals: &[Totals], runs: Range<u64>, gate: &Gat
         axes.push(outcome);
         tests.extend(own);
     }
-    let verdict = if tests.iter().all(|t| t.pass) { Verdict::Consistent } else { Verdict::Inconsistent };
+    let verdict = if tests.iter().all(|t| t.pass()) { Verdict::Consistent } else { Verdict::Inconsistent };
     let mut outcome = Outcome {
         verdict,
         meaning: String::new(),
@@ -152,6 +147,6 @@ pub fn conclude(course: &Course, totals: &[Totals], runs: Range<u64>, gate: &Gat
         tests,
         axes,
     };
-    outcome.meaning = sentences::verdict(&outcome);
+    outcome.meaning = sentences::verdict(&outcome) + &sentences::unsettled(course);
     outcome
 }

@@ -1,6 +1,6 @@
 //! What a result means, in words. Optimistic: errors larger than claimed. Pessimistic: smaller.
 
-use super::Outcome;
+use super::{Course, Outcome};
 use crate::consistency::Test;
 use crate::units::digits;
 
@@ -106,9 +106,28 @@ pub(super) fn low_frequency(value: f64, bounds: [f64; 2], seconds: f64) -> Strin
     }
 }
 
+/// What runs that end before the filter settles do not judge.
+pub(super) fn unsettled(course: &Course) -> String {
+    let duration = course.steps as f64 * course.dt;
+    let slow: Vec<String> = course
+        .axes
+        .iter()
+        .filter(|axis| axis.settling_s > duration)
+        .map(|axis| format!("{} ({} s)", axis.name, digits(axis.settling_s)))
+        .collect();
+    if slow.is_empty() {
+        return String::new();
+    }
+    format!(
+        "; runs of {} s end before the filter has settled: {}; judged is the way there, not the settled filter, which a longer --duration judges",
+        digits(duration),
+        slow.join(", ")
+    )
+}
+
 /// The verdict in a sentence.
 pub(super) fn verdict(outcome: &Outcome) -> String {
-    let failed: Vec<&Test> = outcome.tests.iter().filter(|t| !t.pass).collect();
+    let failed: Vec<&Test> = outcome.tests.iter().filter(|t| !t.pass()).collect();
     let Some(worst) = failed.iter().min_by(|a, b| a.p_value.total_cmp(&b.p_value)) else {
         return "errors and innovations are what the filter says".into();
     };

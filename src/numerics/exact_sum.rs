@@ -2,7 +2,8 @@
 
 /// The exact sum of any number of doubles, as a list of doubles that do not overlap.
 ///
-/// Adding, and merging two sums, loses nothing, so any grouping gives the same number. Infinite or NaN terms make the sum so.
+/// Adding, and merging two sums, loses nothing, so any grouping gives the same number. Infinite or NaN terms make the sum so, and for good;
+/// so does a sum that leaves the range of doubles on its way.
 /// Source: Shewchuk 1997, Discrete Comput. Geom. 18, section 2 (grow-expansion).
 #[derive(Clone, Debug, Default)]
 pub struct ExactSum {
@@ -14,8 +15,9 @@ pub struct ExactSum {
 
 impl ExactSum {
     pub fn add(&mut self, term: f64) {
-        if !term.is_finite() {
+        if !term.is_finite() || self.unbounded != 0.0 {
             self.unbounded += term;
+            self.partials.clear();
             return;
         }
         let mut carry = term;
@@ -23,6 +25,12 @@ impl ExactSum {
         for i in 0..self.partials.len() {
             let (large, small) = ordered(carry, self.partials[i]);
             let sum = large + small;
+            if !sum.is_finite() {
+                // what overflowed stays so: its rest would be no number, and each further term would add one more to the list
+                self.unbounded += sum;
+                self.partials.clear();
+                return;
+            }
             let rest = small - (sum - large);
             if rest != 0.0 {
                 self.partials[kept] = rest;
@@ -122,6 +130,25 @@ mod tests {
         assert_eq!(sum(&[1e16, 1.0]).digits(), vec![1e16, 1.0]);
         assert_eq!(sum(&[f64::INFINITY, 1.0]).value(), f64::INFINITY);
         assert!(sum(&[f64::INFINITY, f64::NEG_INFINITY]).value().is_nan());
+    }
+
+    /// What overflows is infinite and takes no more room for further terms, one by one or merged.
+    #[test]
+    fn an_overflow_stays_one_number() {
+        let mut total = sum(&[f64::MAX, f64::MAX]);
+        for i in 0..10_000 {
+            total.add(1.0 / f64::from(i + 1));
+            assert!(total.partials.len() <= 1);
+        }
+        assert_eq!(total.value(), f64::INFINITY);
+        assert_eq!(total.digits(), [f64::INFINITY]);
+        let mut merged = sum(&[1.0, 1e-300]);
+        merged.merge(&total);
+        merged.add(-5.0);
+        assert_eq!((merged.value(), merged.partials.len()), (f64::INFINITY, 0));
+        assert_eq!(sum(&[-f64::MAX, -f64::MAX, 1.0]).value(), f64::NEG_INFINITY);
+        merged.merge(&sum(&[-f64::MAX, -f64::MAX]));
+        assert!(merged.value().is_nan());
     }
 
     /// Any order and any grouping give the same digits.

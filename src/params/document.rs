@@ -333,6 +333,12 @@ impl Serialize for Params {
     }
 }
 
+/// Axes of one document: sixteen sensors of three axes and some more.
+const MOST_AXES: usize = 64;
+/// Noise terms of one axis. Each makes a state or two, and the work grows with the cube of their number: so many take some ten seconds to
+/// tune, sixty took more than a minute. `identify` finds at most half as many.
+const MOST_TERMS: usize = 24;
+
 /// The whole document.
 pub(super) fn params(root: &Place<'_>) -> Result<Params, KeyError> {
     let object =
@@ -341,7 +347,11 @@ pub(super) fn params(root: &Place<'_>) -> Result<Params, KeyError> {
     let sample_rate = object.required("sample_rate")?;
     let sample_rate_hz = Measured::from_place(&sample_rate, Dimension::FREQUENCY, Range::Positive)?.si();
     let list = object.required("axes")?;
-    let axes = list.list()?.iter().map(|p| axis(p, quantity)).collect::<Result<Vec<_>, _>>()?;
+    let places = list.list()?;
+    if places.len() > MOST_AXES {
+        return Err(list.error(format!("{} axes; expected at most {MOST_AXES}", places.len())));
+    }
+    let axes = places.iter().map(|p| axis(p, quantity)).collect::<Result<Vec<_>, _>>()?;
     if axes.is_empty() {
         return Err(list.error("there is no axis; at least one is needed"));
     }
@@ -379,6 +389,11 @@ pub(super) fn axis(place: &Place<'_>, quantity: Quantity) -> Result<AxisParams, 
     for key in TERM_KEYS {
         let Some(place) = object.optional(key) else { continue };
         for item in place.one_or_many()? {
+            if terms.len() == MOST_TERMS {
+                return Err(item.error(format!(
+                    "more than {MOST_TERMS} noise terms on one axis; join those of nearly one correlation time or frequency"
+                )));
+            }
             terms.push(term(key, &item, base)?);
         }
     }

@@ -8,7 +8,7 @@ use serde::{Serialize, Serializer};
 use serde_json::Value;
 
 use super::place::{KeyError, Place, describe};
-use crate::units::{Dimension, Unit};
+use crate::units::{Dimension, LARGEST, Unit};
 
 /// A value with its unit as written and, if known, a 95 % interval in the same unit.
 /// Serialised as `{"value": 0.0562, "unit": "deg/s/sqrt(Hz)", "interval": [0.0555, 0.0569]}`; the short form `"0.0562 deg/s/sqrt(Hz)"` is read too.
@@ -45,10 +45,21 @@ impl Measured {
         Measured { value: unit.from_si(value), interval: interval.map(|i| i.map(|v| unit.from_si(v))), unit }
     }
 
+    /// Refuses sizes of which fourth powers, and ratios of them, leave the range of doubles.
+    fn size(&self) -> Result<(), String> {
+        let si = self.si().abs();
+        if self.value == 0.0 || (1.0 / LARGEST..=LARGEST).contains(&si) {
+            return Ok(());
+        }
+        let end = if si > 1.0 { "larger" } else { "smaller" };
+        Err(format!("{} {} is {end} than any sensor's: expected a size of 1e-30 to 1e30 in SI", self.value, self.unit))
+    }
+
     /// A positive value from a text such as `0.0562 deg/s/sqrt(Hz)`, with its dimension checked; an error says what is wrong.
     pub fn positive(text: &str, expected: Dimension) -> Result<Measured, String> {
         let measured = short_form(text)?;
         measured.unit.require(expected).map_err(|e| e.to_string())?;
+        measured.size()?;
         if measured.value > 0.0 { Ok(measured) } else { Err(format!("{text} must be greater than zero")) }
     }
 
@@ -67,6 +78,7 @@ impl Measured {
             ))),
         }?;
         measured.unit.require(expected).map_err(|e| place.error(e.to_string()))?;
+        measured.size().map_err(|message| place.error(message))?;
         if range == Range::Positive {
             if measured.value <= 0.0 {
                 return Err(place.error(format!(

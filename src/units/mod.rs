@@ -14,6 +14,10 @@ use serde::{Deserialize, Serialize};
 
 use symbol::Symbol;
 
+/// In SI nothing that a sensor gives or has is larger, and nothing but zero smaller than its inverse: fourth powers, ratios of them, and sums of
+/// as many as a log has samples stay in the range of doubles.
+pub const LARGEST: f64 = 1e30;
+
 /// Exponents of the base dimensions **times two**, so that `1/sqrt(Hz)` is exact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub struct Dimension {

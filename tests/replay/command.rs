@@ -89,8 +89,12 @@ fn command_end_to_end() {
     assert_eq!(failed.status, 1, "{}", failed.stderr);
     assert!(failed.stdout.contains("\"verdict\": \"inconsistent\""));
     let short = bench.run("replay filter.json log.csv --end 60");
-    assert_eq!(short.status, 0);
+    // what says nothing is no green light, unless that is asked for
+    assert_eq!(short.status, 1);
     assert!(short.stdout.contains("\ninconclusive: x: "), "{}", short.stdout);
+    let allowed = bench.run("replay filter.json log.csv --end 60 --allow-inconclusive");
+    assert_eq!((allowed.status, &allowed.stdout), (0, &short.stdout));
+    assert_eq!(bench.run("replay wrong.json log.csv --allow-inconclusive").status, 1);
 }
 
 /// `--smooth` over a gap and an outlier: the filtered columns are those of the plain output, to the bit; sigmas shrink, at the last sample nothing does.

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow, bail};
 
 use super::super::Status;
+use super::super::files;
 use super::super::output::print_text;
 use super::{Args, TargetFlag};
 use crate::export::atomic::{self, AtomicFile};
@@ -59,6 +60,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     }
     let path = &args.params;
     let (folder, name) = place(args)?;
+    files::check(&[], &[path])?;
     let mut design = FilterDesign::read(path)?;
     if let Some(axis) = &args.axis {
         let names: Vec<String> = design.axes.iter().map(|a| a.name.clone()).collect();
@@ -90,7 +92,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     };
     match folder {
         Some(folder) => write(&folder, &name, &sources, path)?,
-        None => print_text(&sources.iter().map(|source| source.text.as_str()).collect::<String>())?,
+        None => print_text(&sources.iter().map(|source| source.text.as_str()).collect::<String>()),
     }
     Ok(Status::Done)
 }
@@ -127,5 +129,6 @@ fn write(folder: &Path, name: &str, sources: &[Source], input: &Path) -> anyhow:
         text.push_str(&format!("{} written\n", file.path().display()));
         file.commit()?;
     }
-    print_text(&text)
+    print_text(&text);
+    Ok(())
 }

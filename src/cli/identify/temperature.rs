@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::tables;
 use crate::cli::output::digits;
+use crate::cli::output::say;
 use crate::cli::stretch::Stretch;
 use crate::identify::Fitted;
 use crate::identify::temperature::{Effect, Pair, Regressor, SMOOTHING_S, Smoothed, effect, smoothed};
@@ -41,7 +42,7 @@ impl Warmth {
         let first = *columns.first()?;
         let unit = first.unit.times_time(0);
         if columns.len() < readings.len() || columns.iter().any(|other| other.unit.times_time(0) != unit) {
-            eprintln!("  note: the logs do not all have a temperature in {unit}: there is no regression on it");
+            say(&format!("  note: the logs do not all have a temperature in {unit}: there is no regression on it"));
             return None;
         }
         let mut logs: Vec<(Smoothed, Vec<Gap>)> = readings

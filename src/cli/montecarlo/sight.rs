@@ -136,7 +136,7 @@ fn row(axis: &str, name: &str, filter: Option<&Measured>, truth: Option<&Measure
 }
 
 fn tests(outcome: &Outcome) -> Section {
-    let failed = outcome.tests.iter().filter(|t| !t.pass);
+    let failed = outcome.tests.iter().filter(|t| !t.pass());
     Section::new("Tests")
         .list(failed.map(|t: &Test| format!("{}, {}: {}.", t.axis, t.name, t.meaning)).collect())
         .table(

@@ -50,7 +50,7 @@ pub(super) fn one_run(args: &Args, experiment: &Experiment, course: &Course, num
             course.steps,
             digits(course.dt),
             path.display()
-        ))?;
+        ));
     }
     Ok(Status::Done)
 }

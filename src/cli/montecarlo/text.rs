@@ -158,7 +158,7 @@ pub(super) fn test_rows(outcome: &Outcome) -> Vec<Vec<String>> {
             digits(test.upper),
             digits(test.p_value),
             digits(test.adjusted_p_value),
-            if test.pass { "pass" } else { "FAIL" }.to_string(),
+            if test.pass() { "pass" } else { "FAIL" }.to_string(),
             test.meaning.clone(),
         ]
     };

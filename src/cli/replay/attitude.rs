@@ -7,8 +7,6 @@ use super::{Args, FormFlag, Status};
 use crate::cli::aid_columns::column_and_unit;
 use crate::cli::log_flags::print_check;
 use crate::cli::output::{digits, print_json, print_text, progress, table};
-use crate::consistency::Verdict;
-use crate::export::atomic::refuse_input_as_output;
 use crate::export::table::TableWriter;
 use crate::filter::AttitudeDesign;
 use crate::filter::attitude::{Heading, Row};
@@ -74,10 +72,6 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         bail!("{flag} is made for linear filters, {} is an attitude filter", args.filter.display());
     }
     let design = AttitudeDesign::read(&args.filter)?;
-    for output in args.output.iter() {
-        refuse_input_as_output(output, &args.log)?;
-        refuse_input_as_output(output, &args.filter)?;
-    }
     let std_dev =
         Measured::positive(args.attitude.reference_sigma.trim(), Quantity::AngularRate.dimension().times_time(2));
     let std_dev = std_dev.map_err(|message| anyhow::anyhow!("--reference-sigma: {message}"))?.si();
@@ -135,9 +129,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if args.json {
         print_json(&result)?;
     } else {
-        print_text(&text(&result, &design))?;
+        print_text(&text(&result, &design));
     }
-    Ok(if result.verdict == Verdict::Inconsistent { Status::CheckFailed } else { Status::Done })
+    Ok(args.judging.status([result.verdict]))
 }
 
 /// The extra columns of the log and what each is.

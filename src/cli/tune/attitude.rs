@@ -42,7 +42,7 @@ pub(super) fn run(args: &Args, name: &str, params: &Params, design: &Design) -> 
         if let Some(output) = &args.output {
             printed.push_str(&format!("\n{} written\n", output.display()));
         }
-        print_text(&printed)?;
+        print_text(&printed);
     }
     Ok(Status::Done)
 }

@@ -21,6 +21,7 @@ pub(super) fn run(
     options: &TuneOptions,
     reading: &Reading<'_>,
 ) -> anyhow::Result<Status> {
+    crate::cli::files::check(&[], &files.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
     if !(held_out > 0.0 && held_out <= 0.9) {
         bail!("--held-out is {held_out}; expected a share of the log above 0 and up to 0.9");
     }
@@ -47,7 +48,7 @@ pub(super) fn run(
     if json {
         print_json(&ranking)?;
     } else {
-        print_text(&text(&ranking, &first))?;
+        print_text(&text(&ranking, &first));
     }
     Ok(Status::Done)
 }

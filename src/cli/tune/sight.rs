@@ -46,7 +46,7 @@ pub(super) fn page(view: &View<'_>, replays: &[ReplayResult]) -> Page {
             digits(t.lower),
             digits(t.upper),
             digits(t.adjusted_p_value),
-            if t.pass { "pass" } else { "FAIL" }.to_string(),
+            if t.pass() { "pass" } else { "FAIL" }.to_string(),
         ]
     });
     sections.push(

@@ -360,7 +360,7 @@ pub(super) fn verification_rows(outcome: &Outcome) -> Vec<Vec<String>> {
             or_none(axis.nees.mean.last().copied()),
             or_none(axis.innovations.first().map(|i| i.nis)),
             digits(least),
-            if mine().all(|t| t.pass) { "pass" } else { "FAIL" }.into(),
+            if mine().all(|t| t.pass()) { "pass" } else { "FAIL" }.into(),
         ]
     };
     outcome.axes.iter().map(row).collect()
@@ -382,7 +382,7 @@ pub(super) fn verification_sentence(outcome: &Outcome, sample_rate_hz: f64) -> S
             let failed: Vec<String> = outcome
                 .tests
                 .iter()
-                .filter(|t| !t.pass)
+                .filter(|t| !t.pass())
                 .map(|t| format!("{} {}: {}", t.axis, t.name, t.meaning))
                 .collect();
             format!("{what}: {}", failed.join("; "))

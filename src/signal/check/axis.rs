@@ -22,7 +22,7 @@ use super::stamps::Count;
 use super::windows::{Extent, Windows, surely_quiet};
 use super::{InputKind, Note, Place, Places};
 use crate::numerics::reduce::Moments;
-use crate::units::{Quantity, Unit};
+use crate::units::{LARGEST, Quantity, Unit};
 
 const WINDOW: usize = 1000;
 const SHORTEST_WINDOW: usize = 50;
@@ -65,6 +65,8 @@ pub(super) struct AxisCheck {
     quantity: Quantity,
     kind: InputKind,
     pub(super) nan: Count,
+    /// Infinite, or made so by the reader since no sensor gives as much.
+    pub(super) vast: Count,
     pub(super) usable: u64,
     /// Smallest and largest raw value.
     pub(super) range: (f64, f64),
@@ -109,6 +111,7 @@ impl AxisCheck {
             quantity,
             kind,
             nan: Count::default(),
+            vast: Count::default(),
             usable: 0,
             range: (f64::INFINITY, f64::NEG_INFINITY),
             zeros: 0,
@@ -179,7 +182,11 @@ impl AxisCheck {
     #[inline(never)]
     fn add(&mut self, value: f64, place: Place) {
         if !value.is_finite() {
-            self.nan.add(place);
+            if value.is_nan() {
+                self.nan.add(place)
+            } else {
+                self.vast.add(place)
+            }
             self.end_run();
             self.previous = None;
             return;
@@ -304,17 +311,21 @@ impl AxisCheck {
     }
 
     fn nan_finding(&self, out: &mut Vec<Note>) {
-        let Count { count, first: Some(first) } = self.nan else { return };
-        out.push(Note {
-            kind: "nan",
-            count,
-            first: Some(first),
-            message: format!(
-                "{count} {} empty or not a number; skipped, not replaced",
-                are(count, "value is", "values are")
+        let all = self.usable + self.nan.count + self.vast.count;
+        let kinds = [
+            ("nan", self.nan, "empty or not a number; skipped, not replaced".to_string()),
+            (
+                "overflow",
+                self.vast,
+                format!("infinite or beyond {LARGEST:e} in SI, which no sensor gives; skipped, not replaced"),
             ),
-            serious: count * 100 > self.usable + count,
-        });
+        ];
+        for (kind, Count { count, first }, what) in kinds {
+            if first.is_some() {
+                let message = format!("{count} {} {what}", are(count, "value is", "values are"));
+                out.push(Note { kind, count, first, message, serious: count * 100 > all });
+            }
+        }
     }
 
     fn stuck(&self, step: Option<f64>, noise: f64, out: &mut Vec<Note>) {

@@ -116,7 +116,12 @@ fn writing_and_reading_gives_the_same_document() {
                 turn_on_bias: None,
                 temperature: None,
                 terms: vec![],
-                not_identified: vec![NotIdentified { term: "white".into(), reason: "why".into(), needed_log_s: None }],
+                not_identified: vec![NotIdentified {
+                    term: "white".into(),
+                    reason: "why".into(),
+                    needed_log_s: None,
+                    upper_limit: None,
+                }],
             },
         ],
         design: None,

@@ -251,7 +251,7 @@ fn there_and_back() {
         ("orbslam3", "--accelerometer acc.json"),
         ("gnss-ins-sim", ""),
     ] {
-        bench.ok(&format!("export three.json --to {target} {of} -o once"));
+        bench.ok(&format!("export three.json --to {target} {of} --walk short -o once"));
         let force = if of.is_empty() { "" } else { "--accelerometer force.json" };
         let rate = if of.is_empty() { "--rate 100" } else { "" };
         bench.ok(&format!("import once -o back.json {force} {rate}"));

@@ -69,6 +69,31 @@ fn export(bench: &Bench, language: &str, name: &str, filter: &str, precision: &s
     bench.ok(&format!("export {filter} --to {language} --precision {precision} --form {form} -o {name}.{extension}"));
 }
 
+/// The line that the command prints builds and runs the self-test, and a program in C++ links with the files as C and finds the self-test in the
+/// header: without `extern "C"` its names are others. Each language is skipped, with a line, where its compiler is not.
+#[test]
+fn the_printed_line_runs_the_self_test_and_cpp_links() {
+    let bench = Bench::new();
+    bench.file("still.json", design(Value::Null).to_json());
+    let told = bench.ok("export still.json --to c -o still.c");
+    let line = told.lines().find_map(|line| line.split_once("self-test, in that folder: ")).unwrap().1.to_owned();
+    let test = bench.read("still_test.c");
+    assert!(test.contains(&line), "{line}: {test}");
+    let tools = Toolchain::new(&bench);
+    if let Some(told) = tools.shell("cc", &line) {
+        assert!(told.status.success(), "{line}: {}", String::from_utf8_lossy(&told.stderr));
+    }
+    bench.file(
+        "main.cpp",
+        "#include \"still.h\"\nint main()\n{\n    still_x_t filter;\n    still_x_init(&filter);\n    still_x_predict(&filter);\n    \
+         return still_x_update(&filter, 0U, 0.0F, 0.0F).accepted ? still_self_test() : 100;\n}\n",
+    );
+    let build = "cc -std=c99 -c still.c still_test.c && g++ -Wall -Wextra -pedantic -Werror main.cpp still.o still_test.o -o both && ./both";
+    if let Some(told) = tools.shell("g++", build) {
+        assert!(told.status.success(), "{}", String::from_utf8_lossy(&told.stderr));
+    }
+}
+
 /// Both precisions and forms of every plant, in both languages, with all warnings as errors; every self-test passes.
 #[test]
 fn every_plant_compiles_without_a_warning_and_passes_its_self_test() {
@@ -90,14 +115,13 @@ fn every_plant_compiles_without_a_warning_and_passes_its_self_test() {
     tools.rust(&modules, &format!("fn main() {{\n{checks}}}\n"));
     let told = tools.run("rust", "", &[]);
     assert!(told.status.success(), "{}", String::from_utf8_lossy(&told.stderr));
-    let declared: String = names.iter().map(|name| format!("int32_t {name}_self_test(void);\n")).collect();
+    let declared: String = names.iter().map(|name| format!("#include \"{name}.h\"\n")).collect();
     let checks: String = names
         .iter()
         .map(|name| format!("    if ({name}_self_test() != 0) {{ puts(\"{name}\"); bad = 1; }}\n"))
         .collect();
-    let main = format!(
-        "#include <stdint.h>\n#include <stdio.h>\n{declared}int main(void)\n{{\n    int bad = 0;\n{checks}    return bad;\n}}\n"
-    );
+    let main =
+        format!("#include <stdio.h>\n{declared}int main(void)\n{{\n    int bad = 0;\n{checks}    return bad;\n}}\n");
     let sources: Vec<String> = names.iter().flat_map(|name| [format!("{name}.c"), format!("{name}_test.c")]).collect();
     // also with fused multiplications, where the processor has them
     for flags in [&["-O2"][..], &["-O2", "-march=native", "-ffp-contract=fast"]] {

@@ -13,7 +13,7 @@ use kfdesign::identify::{Identified, Method, ModelChoice, identify_axis, parse_m
 use kfdesign::noise::{Filter, NoiseModel, Term};
 use kfdesign::numerics::random::{StreamId, stream};
 use kfdesign::params::TermEntry;
-use kfdesign::units::Unit;
+use kfdesign::units::{Quantity, Unit};
 use rayon::prelude::*;
 
 /// The reference sensor in deg, s (0.0562 deg/s/√Hz, 0.02806 deg/s, 193.93 s).
@@ -313,6 +313,10 @@ fn white_log_bounds_the_random_walk() {
     // K at which the random walk equals the white noise at tau: K = N √3/tau
     assert!((N * 3.0_f64.sqrt() / 7200.0..N * 3.0_f64.sqrt() / 300.0).contains(&limit), "{}", walk.reason);
     assert!(walk.needed_log_s.is_none());
+    // the same as a number
+    let number = walk.upper_limit.as_ref().unwrap();
+    assert!((number.value / limit - 1.0).abs() < 1e-3, "{} {limit}", number.value);
+    assert_eq!(number.unit.dimension(), Quantity::AngularRate.dimension().times_time(-1));
 }
 
 /// The log length that would tell scales as the square of the interval: at twice the length the sentence must not ask for more

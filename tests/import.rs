@@ -251,7 +251,7 @@ fn there_and_back() {
         ("orbslam3", "--accelerometer acc.json"),
         ("gnss-ins-sim", ""),
     ] {
-        bench.ok(&format!("export three.json --to {target} {of} -o once"));
+        bench.ok(&format!("export three.json --to {target} {of} --walk short -o once"));
         let force = if of.is_empty() { "" } else { "--accelerometer force.json" };
         let rate = if of.is_empty() { "--rate 100" } else { "" };
         bench.ok(&format!("import once -o back.json {force} {rate}"));
@@ -475,11 +475,11 @@ fn a_files_numbers_beside_a_log() {
         );
     }
     // the walk of Kalibr is the growth of the drift over short times
-    bench.ok("export truth.json --to kalibr -o imu.yaml");
+    bench.ok("export truth.json --to kalibr --walk short -o imu.yaml");
     let kalibr = rows("imu.yaml log.npy");
     assert!(of(&kalibr, "white.density").1 && of(&kalibr, "rate_random_walk.density").1, "{kalibr:?}");
     // ten times, as people inflate; an interval of K is a factor of 1.2 wide each way
-    bench.ok("export truth.json --to kalibr --inflate 10 -o loud.yaml");
+    bench.ok("export truth.json --to kalibr --walk short --inflate 10 -o loud.yaml");
     let loud = rows("loud.yaml log.npy");
     for name in ["white.density", "rate_random_walk.density"] {
         let (ratio, inside, meaning) = of(&loud, name);

@@ -18,7 +18,7 @@ fn document() -> Value {
             "turn_on_bias": {"std_dev": "0.6 deg/s"},
             "white": {"density": {"value": 0.0562, "unit": "deg/s/sqrt(Hz)", "interval": [0.0555, 0.0569]}},
             "gauss_markov": [{"std_dev": "0.0280596 deg/s", "correlation_time": "193.9312 s"}],
-            "not_identified": [{"term": "rate_random_walk", "reason": "hidden by white noise", "needed_log": "16 h"}]
+            "not_identified": [{"term": "rate_random_walk", "reason": "hidden by white noise", "needed_log": "16 h", "upper_limit": "0.002 deg/s/sqrt(s)"}]
         }]
     })
 }
@@ -60,6 +60,10 @@ fn short_and_long_form_read_to_si() {
     assert!((std_dev / (0.0280596 * degree) - 1.0).abs() < 1e-15);
     assert_eq!(correlation_time, 193.9312);
     assert_eq!(axis.not_identified[0].needed_log_s, Some(57_600.0));
+    let limit = axis.not_identified[0].upper_limit.as_ref().unwrap().si();
+    assert!((limit / (0.002 * degree) - 1.0).abs() < 1e-15, "{limit}");
+    let wrong = json!([{"term": "rate_random_walk", "reason": "hidden", "upper_limit": "0.002 deg/s"}]);
+    assert!(parse(&with("/axes/0/not_identified", wrong)).unwrap_err().contains("not_identified[0].upper_limit"));
     let TermEntry::White { density } = &axis.terms[0] else { panic!() };
     assert_eq!(density.interval, Some([0.0555, 0.0569]));
 }
@@ -116,7 +120,12 @@ fn writing_and_reading_gives_the_same_document() {
                 turn_on_bias: None,
                 temperature: None,
                 terms: vec![],
-                not_identified: vec![NotIdentified { term: "white".into(), reason: "why".into(), needed_log_s: None }],
+                not_identified: vec![NotIdentified {
+                    term: "white".into(),
+                    reason: "why".into(),
+                    needed_log_s: None,
+                    upper_limit: None,
+                }],
             },
         ],
         design: None,

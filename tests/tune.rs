@@ -4,6 +4,7 @@ mod lines;
 mod low_pass;
 mod objectives;
 mod under_truth;
+mod walk;
 
 use kfdesign::consistency::Verdict;
 use kfdesign::filter::FilterDesign;

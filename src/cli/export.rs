@@ -11,9 +11,8 @@ use super::files::{self, Kind};
 use super::flags::with_unit;
 use super::output::{digits, print_text, say};
 use crate::export::atomic;
-use crate::export::consumer::{Choice, Export, Sensor, Target, Walk, write};
+use crate::export::consumer::{Choice, Export, Target, Walk, write};
 use crate::params::Params;
-use crate::tune::walk_price;
 use crate::units::{Dimension, Quantity};
 
 /// Noise parameters in the files and units of other programs; a filter as source code in C or Rust
@@ -44,10 +43,13 @@ pub struct Args {
     /// to write [default: all]
     #[arg(long, value_name = "AXIS")]
     axis: Option<String>,
-    /// Where the file knows no other drift than a random walk: short (the growth over short times) or horizon=60s (the growth over that time)
-    /// [default: short]
+    /// Where the file knows no other drift than a random walk: least (what costs the program's filter least), short (the growth over short
+    /// times) or horizon=60s (the growth over that time) [default: least]
     #[arg(long, value_name = "RULE")]
     walk: Option<String>,
+    /// Write zeros where no drift is known
+    #[arg(long)]
+    allow_zero_walk: bool,
     #[command(flatten)]
     code: code::Flags,
 }
@@ -101,8 +103,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     }
     let inputs: Vec<&Path> = std::iter::once(args.params.as_path()).chain(args.accelerometer.as_deref()).collect();
     files::check(&[("-o", &args.output, Kind::Other)], &inputs)?;
-    let walk = walk(args.walk.as_deref().unwrap_or("short"))?;
+    let walk = walk(args.walk.as_deref().unwrap_or("least"))?;
     let mut export = Export {
+        target,
         gyro: None,
         accelerometer: None,
         rate_hz: args.rate,
@@ -115,8 +118,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
             name => Choice::Axis(name.to_owned()),
         },
         walk,
+        allow_zero_walk: args.allow_zero_walk,
         origin: vec![format!("kfdesign {} export", env!("CARGO_PKG_VERSION"))],
-        price: Vec::new(),
     };
     for (path, given) in [(Some(&args.params), ""), (args.accelerometer.as_ref(), "--accelerometer ")] {
         let Some(path) = path else { continue };
@@ -130,7 +133,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         }
         add(&mut export, path, &params)?;
     }
-    let written = write(target, &export).map_err(|message| anyhow!(message))?;
+    let written = write(&export).map_err(|message| anyhow!(message))?;
     for warning in &written.warnings {
         say(&format!("  warning: {warning}"));
     }
@@ -147,7 +150,6 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
 /// One sensor of the unit with what is said of its origin.
 fn add(export: &mut Export, path: &Path, params: &Params) -> anyhow::Result<()> {
     let shown = path.display().to_string();
-    let sensor = Sensor::new(params, export.walk).map_err(|message| anyhow!(message)).with_context(|| shown.clone())?;
     let source = params.source.clone().unwrap_or_default();
     let log = source.log.map_or_else(String::new, |log| format!(", from {log}"));
     let hash = source.sha256.map_or_else(String::new, |hash| format!(" (sha256 {hash})"));
@@ -164,31 +166,12 @@ fn add(export: &mut Export, path: &Path, params: &Params) -> anyhow::Result<()> 
             digits(high)
         )
     }));
-    for (axis, numbers) in params.axes.iter().zip(&sensor.axes).filter(|(_, n)| !n.processes.is_empty()) {
-        let price = walk_price(axis, params.quantity, 1.0 / params.sample_rate_hz, numbers.walk.value);
-        if let Some(price) = price {
-            export.price.push(format!(
-                "{}: at rest a filter with this walk has {} times the error of one with the true drift, NEES {}",
-                axis.name,
-                digits(price.error),
-                digits(price.nees)
-            ));
-        }
-    }
-    export.sample_rate_hz = if export.sample_rate_hz > 0.0 { export.sample_rate_hz } else { params.sample_rate_hz };
-    let slot = match params.quantity {
-        Quantity::AngularRate => &mut export.gyro,
-        Quantity::SpecificForce => &mut export.accelerometer,
-    };
-    if slot.is_some() {
-        bail!("{shown}: both files are of a {}", params.quantity.name());
-    }
-    *slot = Some(sensor);
-    Ok(())
+    export.add(params).map_err(|message| anyhow!(message)).with_context(|| shown)
 }
 
 fn walk(text: &str) -> anyhow::Result<Walk> {
     match text.split_once('=') {
+        None if text == "least" => Ok(Walk::Least),
         None if text == "short" => Ok(Walk::Short),
         Some(("horizon", time)) => {
             let seconds = with_unit("--walk horizon", time, Dimension::TIME, "60s")?;
@@ -197,6 +180,6 @@ fn walk(text: &str) -> anyhow::Result<Walk> {
             }
             bail!("--walk {text}: expected a time above zero")
         }
-        _ => bail!("--walk {text}: expected short or horizon=TIME, for example horizon=60s"),
+        _ => bail!("--walk {text}: expected least, short or horizon=TIME, for example horizon=60s"),
     }
 }

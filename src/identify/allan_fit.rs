@@ -17,7 +17,7 @@ use crate::allan::{self, AllanCurve, Deviation, TauGrid};
 use crate::noise::{Kind, NoiseModel, Term};
 use crate::numerics::distribution::{NORMAL_90, NORMAL_95};
 use crate::numerics::reduce::mean;
-use crate::params::{AxisParams, NotIdentified};
+use crate::params::{AxisParams, Measured, NotIdentified};
 use crate::units::{Unit, digits};
 
 /// Points of the curve per decade of averaging time; denser ones add correlation, not information.
@@ -239,6 +239,7 @@ impl Words<'_> {
             needed_log_s: self
                 .length_for(fit, index, WIDEST_INTERVAL)
                 .and_then(|needed| worth_recording(needed, self.points.span_s())),
+            upper_limit: None,
         }
     }
 
@@ -291,6 +292,7 @@ impl Words<'_> {
                 digits(score(chosen)),
             ),
             needed_log_s: inside.then_some((LENGTHS_TO_TELL * time).max(4.0 * self.points.span_s())),
+            upper_limit: None,
         }
     }
 
@@ -300,14 +302,17 @@ impl Words<'_> {
         if fit.shape.kinds().iter().any(|k| !matches!(k, Kind::White | Kind::Quantization)) {
             return vec![];
         }
-        let limit = largest_tolerated(self.points, fit, kind).map_or_else(String::new, |limit| {
-            let unit = super::coefficient_unit(kind, self.display);
-            format!("; a random walk above {} {unit} would have shown (95 %)", digits(unit.from_si(limit)))
-        });
+        let unit = super::coefficient_unit(kind, self.display);
+        let limit = largest_tolerated(self.points, fit, kind).map(|limit| Measured::from_si(limit, None, unit));
         vec![NotIdentified {
             term: document_name(kind).into(),
-            reason: format!("no drift is seen above the white noise in {} s{limit}", digits(self.points.span_s())),
+            reason: format!(
+                "no drift is seen above the white noise in {} s{}",
+                digits(self.points.span_s()),
+                super::would_have_shown(limit.as_ref())
+            ),
             needed_log_s: None,
+            upper_limit: limit,
         }]
     }
 

@@ -74,6 +74,7 @@ pub(super) fn identify(name: &str, rate: &[f64], dt: f64, display: &Unit) -> Res
             term: "white".into(),
             reason: "the Allan curve has no stretch of slope -1/2".into(),
             needed_log_s: None,
+            upper_limit: None,
         }),
     }
     match (reading.std_dev, &reading.peak) {
@@ -87,6 +88,7 @@ pub(super) fn identify(name: &str, rate: &[f64], dt: f64, display: &Unit) -> Res
                  (a maximum exists only if N/(σ√Tc) < {LARGEST_RATIO}, and shows only in a log of many Tc)"
             ),
             needed_log_s: None,
+            upper_limit: None,
         }),
     }
     let model = NoiseModel { terms };

@@ -288,6 +288,12 @@ fn coefficient_unit(kind: Kind, display: &Unit) -> Unit {
     })
 }
 
+/// Of a random walk that was not seen.
+fn would_have_shown(limit: Option<&Measured>) -> String {
+    let of = |m: &Measured| format!("; a random walk above {} {} would have shown (95 %)", digits(m.value), m.unit);
+    limit.map_or_else(String::new, of)
+}
+
 /// A term as documented, with the 95 % intervals (SI) of its parameters as far as they are known, in the order of [`Term`].
 fn entry(term: &Term, intervals: &[Option<[f64; 2]>], display: &Unit) -> Result<TermEntry, IdentifyError> {
     let unit = coefficient_unit(term.kind(), display);

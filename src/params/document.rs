@@ -190,6 +190,9 @@ struct NotIdentifiedDocument {
     /// Length of log that would tell.
     #[serde(skip_serializing_if = "Option::is_none")]
     needed_log: Option<Measured>,
+    /// Of "rate_random_walk": the largest density that would not have shown in the log (95 %).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    upper_limit: Option<Measured>,
 }
 
 /// Where the numbers come from.
@@ -282,6 +285,7 @@ impl From<&AxisParams> for AxisDocument {
                     term: n.term.clone(),
                     reason: n.reason.clone(),
                     needed_log: n.needed_log_s.and_then(|s| in_unit(s, "s")),
+                    upper_limit: n.upper_limit.clone(),
                 })
                 .collect(),
         }
@@ -400,7 +404,7 @@ pub(super) fn axis(place: &Place<'_>, quantity: Quantity) -> Result<AxisParams, 
     let turn_on_bias =
         object.optional("turn_on_bias").map(|p| positive(&p.object(&["std_dev"])?, "std_dev", base)).transpose()?;
     let not_identified = match object.optional("not_identified") {
-        Some(place) => place.list()?.iter().map(not_identified).collect::<Result<Vec<_>, _>>()?,
+        Some(place) => place.list()?.iter().map(|item| not_identified(item, base)).collect::<Result<Vec<_>, _>>()?,
         None => Vec::new(),
     };
     Ok(AxisParams {
@@ -485,12 +489,14 @@ fn positive(object: &Object<'_>, key: &str, expected: Dimension) -> Result<Measu
     Measured::from_place(&object.required(key)?, expected, Range::Positive)
 }
 
-fn not_identified(place: &Place<'_>) -> Result<NotIdentified, KeyError> {
-    let object = place.object(&["term", "reason", "needed_log"])?;
+fn not_identified(place: &Place<'_>, base: Dimension) -> Result<NotIdentified, KeyError> {
+    let object = place.object(&["term", "reason", "needed_log", "upper_limit"])?;
+    let limit = |place: Place<'_>| Measured::from_place(&place, base.times_time(-1), Range::Positive);
     Ok(NotIdentified {
         term: object.required("term")?.text()?.to_string(),
         reason: object.required("reason")?.text()?.to_string(),
         needed_log_s: seconds(&object, "needed_log")?,
+        upper_limit: object.optional("upper_limit").map(limit).transpose()?,
     })
 }
 

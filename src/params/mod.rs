@@ -48,6 +48,8 @@ pub struct NotIdentified {
     pub reason: String,
     /// Log length that would tell, if it can be said.
     pub needed_log_s: Option<f64>,
+    /// Of a random walk that was looked for and not seen: the density that would have shown (95 %).
+    pub upper_limit: Option<Measured>,
 }
 
 /// Bias = bias + coefficient · (temperature − reference).

@@ -37,7 +37,7 @@ pub use flicker::FlickerApproximation;
 pub use insight::{FACTORS, Insight, MISTAKES, Mistake, Observed, OutputInsight, WHOLE_SENSOR, Worth, insight};
 pub use prediction::{Predicted, predicted_sigma};
 pub use under_truth::{ErrorOverTime, Tendency, UnderTruth, under_truth};
-pub use walk_price::{WalkPrice, walk_price};
+pub use walk_price::{AidedFilter, SensorDrift, WalkPrice, WalkTrial, shared_walk};
 
 /// Choices of [`tune`].
 #[derive(Clone, Debug, PartialEq)]

@@ -173,6 +173,15 @@ impl Toolchain {
         }
     }
 
+    /// A line of shell in the folder; `None`, with a printed line, where there is no `compiler`.
+    pub(super) fn shell(&self, compiler: &str, line: &str) -> Option<Output> {
+        if let Err(error) = self.command(compiler, &["--version".to_owned()]) {
+            println!("skipped: no {compiler} here ({error}): {line}");
+            return None;
+        }
+        Some(self.command("sh", &["-c".to_owned(), line.to_owned()]).unwrap())
+    }
+
     /// Compiles the modules as a `no_std` library that denies warnings, and a program `rust` with it; rustc is where cargo is.
     pub(super) fn rust(&self, modules: &str, main: &str) {
         let library = format!("#![no_std]\n#![deny(warnings)]\n#![forbid(unsafe_code)]\n{modules}");

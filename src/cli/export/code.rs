@@ -54,6 +54,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         ("--rate", args.rate.is_some()),
         ("--inflate", args.inflate.is_some()),
         ("--walk", args.walk.is_some()),
+        ("--allow-zero-walk", args.allow_zero_walk),
     ];
     if let Some((flag, _)) = others.iter().find(|(_, given)| *given) {
         bail!("{flag} is for noise parameters; tune a filter with them, then export it as code");
@@ -91,7 +92,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         _ => vec![code::rust(&design, &code).map_err(failed)?],
     };
     match folder {
-        Some(folder) => write(&folder, &name, &sources, path)?,
+        Some(folder) => {
+            write(&folder, &name, &sources, path)?;
+            if args.to == TargetFlag::C {
+                print_text(&format!("self-test, in that folder: {}\n", code::self_test_command(&name)));
+            }
+        }
         None => print_text(&sources.iter().map(|source| source.text.as_str()).collect::<String>()),
     }
     Ok(Status::Done)

@@ -97,6 +97,8 @@ struct Sheet {
     several: bool,
     /// What the self-test allows of S and P, relative.
     spread: String,
+    /// What builds and runs the self-test.
+    build: String,
 }
 
 /// Headers of the C standard library, and words of both languages.
@@ -122,6 +124,12 @@ pub fn check_name(name: &str) -> Result<(), String> {
         "'{name}' becomes the name of types and functions: expected at most 31 small letters, digits and underscores, a letter first, and no word of C, \
          Rust or their libraries"
     ))
+}
+
+/// Builds the self-test of the files of [`c`] as a program in their folder and runs it: status 0 when the code reproduces our filter.
+pub fn self_test_command(name: &str) -> String {
+    let upper = name.to_ascii_uppercase();
+    format!("cc -std=c99 -D{upper}_SELF_TEST_MAIN {name}.c {name}_test.c -o {name}_test && ./{name}_test")
 }
 
 /// NAME.h, NAME.c and NAME_test.c. Errors: a name that will not do, over 255 states, nothing that is measured, a number that single precision does not carry.
@@ -194,6 +202,7 @@ fn sheet(design: &FilterDesign, code: &Code, language: Language) -> Result<Sheet
         parts,
         several,
         spread: number(code.precision.spread(), float),
+        build: self_test_command(&code.name),
     })
 }
 

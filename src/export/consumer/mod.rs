@@ -1,9 +1,10 @@
 //! Parameter files for other programs, each in its own convention. One file per consumer.
 //!
-//! Sources: the consumers' own code and documentation, named in each file. Every file begins with a comment block: where the numbers come from, their
-//! intervals, the rule for the walk and its price, the rate, the inflation.
+//! Sources: the consumers' own code and documentation, named in each file. Every file begins with at most ten lines of comment: where the numbers come
+//! from, what the consumer does with them, the rule for the walk and its price, the inflation. The numbers follow, then the details.
 
 mod ardupilot;
+mod filters;
 mod gazebo;
 mod gnss_ins_sim;
 mod gtsam;
@@ -13,12 +14,18 @@ mod navego;
 mod numbers;
 mod openvins;
 mod orbslam3;
+mod page;
 mod px4;
 mod vins;
+mod walk;
 
+pub use filters::Aiding;
 pub use numbers::{Choice, GaussMarkov, Number, Numbers, Sensor, Walk};
 
+use crate::params::Params;
 use crate::units::{Quantity, digits};
+use numbers::Settings;
+use page::Page;
 
 /// A program that takes noise parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,6 +46,7 @@ pub enum Target {
 /// Everything that a file is made of.
 #[derive(Clone, Debug)]
 pub struct Export {
+    pub target: Target,
     pub gyro: Option<Sensor>,
     pub accelerometer: Option<Sensor>,
     /// Rate of the log, or of the consumer's steps, Hz; `None`: the consumer's default, or that of the parameters.
@@ -51,10 +59,10 @@ pub struct Export {
     pub measured_inflation: Vec<String>,
     pub choice: Choice,
     pub walk: Walk,
+    /// Where no drift was found the file says zero.
+    pub allow_zero_walk: bool,
     /// Lines about the origin, for the comment block.
     pub origin: Vec<String>,
-    /// Lines about the price of the walk.
-    pub price: Vec<String>,
 }
 
 /// A text file for a consumer, with what a person must be told.
@@ -64,48 +72,67 @@ pub struct Written {
     pub warnings: Vec<String>,
 }
 
-/// The file for `target`. Errors: a sensor that the consumer needs is not there, or does not fit its form.
-pub fn write(target: Target, export: &Export) -> Result<Written, String> {
-    let mut written = match target {
-        Target::Kalibr => kalibr::write(export),
-        Target::OpenVins => openvins::write(export),
-        Target::Vins => vins::write(export),
-        Target::OrbSlam3 => orbslam3::write(export),
-        Target::Gtsam => gtsam::write(export),
-        Target::Px4 => px4::write(export),
-        Target::ArduPilot => ardupilot::write(export),
-        Target::Matlab => matlab::write(export),
-        Target::GnssInsSim => gnss_ins_sim::write(export),
-        Target::NaveGo => navego::write(export),
-        Target::Gazebo => gazebo::write(export),
+/// The file. Errors: a sensor that the consumer needs is not there, does not fit its form, or has no drift and no limit of one.
+pub fn write(export: &Export) -> Result<Written, String> {
+    let mut page = Page::new(export.axes().filter_map(Numbers::note).collect());
+    match export.target {
+        Target::Kalibr => kalibr::write(export, &mut page),
+        Target::OpenVins => openvins::write(export, &mut page),
+        Target::Vins => vins::write(export, &mut page),
+        Target::OrbSlam3 => orbslam3::write(export, &mut page),
+        Target::Gtsam => gtsam::write(export, &mut page),
+        Target::Px4 => px4::write(export, &mut page),
+        Target::ArduPilot => ardupilot::write(export, &mut page),
+        Target::Matlab => matlab::write(export, &mut page),
+        Target::GnssInsSim => gnss_ins_sim::write(export, &mut page),
+        Target::NaveGo => navego::write(export, &mut page),
+        Target::Gazebo => gazebo::write(export, &mut page),
     }?;
-    written.warnings.splice(0..0, export.axes().filter_map(Numbers::note));
-    Ok(written)
+    Ok(page.finish(export))
 }
 
 impl Export {
+    /// A sensor of the unit. Errors: see [`Sensor`]; a second one of its kind.
+    pub fn add(&mut self, params: &Params) -> Result<(), String> {
+        self.sample_rate_hz = if self.sample_rate_hz > 0.0 { self.sample_rate_hz } else { params.sample_rate_hz };
+        let own = self.target.own_step().unwrap_or(1.0 / params.sample_rate_hz);
+        let settings = Settings {
+            step: self.rate_hz.map_or(own, |rate| 1.0 / rate),
+            aiding: self.target.aiding(params.quantity),
+            rule: self.walk,
+            inflation: self.inflation,
+        };
+        let sensor = Sensor::new(params, &settings)?;
+        let slot = match params.quantity {
+            Quantity::AngularRate => &mut self.gyro,
+            Quantity::SpecificForce => &mut self.accelerometer,
+        };
+        if slot.is_some() {
+            return Err(format!("both files are of a {}", params.quantity.name()));
+        }
+        *slot = Some(sensor);
+        Ok(())
+    }
+
     fn rate(&self) -> f64 {
         self.rate_hz.unwrap_or(self.sample_rate_hz)
     }
 
+    /// s from one step of the consumer's filter to the next.
+    fn step(&self) -> f64 {
+        let own = self.target.own_step().unwrap_or(1.0 / self.sample_rate_hz);
+        self.rate_hz.map_or(own, |rate| 1.0 / rate)
+    }
+
     /// N of one kind of sensor, one for three axes, inflated; `None` when it is not there.
     fn white(&self, quantity: Quantity) -> Result<Option<f64>, String> {
-        self.one(quantity, |numbers| numbers.white.value)
+        let Some(sensor) = self.sensor(quantity) else { return Ok(None) };
+        Ok(sensor.one(&self.choice, |n| Some(n.white.value))?.map(|n| n * self.inflation))
     }
 
-    /// K, likewise.
-    fn walk(&self, quantity: Quantity) -> Result<Option<f64>, String> {
-        self.one(quantity, |numbers| numbers.walk.value)
-    }
-
-    /// Both, where the sensor is there.
-    fn white_and_walk(&self, quantity: Quantity) -> Result<Option<(f64, f64)>, String> {
-        Ok(self.white(quantity)?.zip(self.walk(quantity)?))
-    }
-
-    fn one(&self, quantity: Quantity, of: impl Fn(&Numbers) -> f64) -> Result<Option<f64>, String> {
-        let inflated = |value: f64| value * self.inflation;
-        self.sensor(quantity).map(|sensor| sensor.one(&self.choice, of).map(inflated)).transpose()
+    /// Spread of the bias between power-ups, not inflated.
+    fn turn_on(&self, quantity: Quantity) -> Result<Option<f64>, String> {
+        self.sensor(quantity).map_or(Ok(None), |sensor| sensor.one(&self.choice, |n| n.turn_on))
     }
 
     fn sensor(&self, quantity: Quantity) -> Option<&Sensor> {
@@ -123,83 +150,24 @@ impl Export {
         self.sensors().flat_map(|sensor| &sensor.axes)
     }
 
-    /// The comment block, each line behind `mark`; `interpretation`: what the consumer does with the numbers.
-    fn head(&self, mark: &str, interpretation: &[&str]) -> String {
-        let mut lines = self.origin.clone();
-        lines.extend(interpretation.iter().map(|line| (*line).to_owned()));
-        for sensor in self.sensors() {
-            let unit = sensor.quantity.si_unit();
-            for axis in &sensor.axes {
-                let interval = |number: &Number| {
-                    number
-                        .interval
-                        .map_or_else(String::new, |[low, high]| format!(" [{}, {}]", exponent(low), exponent(high)))
-                };
-                lines.push(format!(
-                    "{}: N = {}{} {unit}/sqrt(Hz), K = {}{} {}",
-                    axis.name,
-                    exponent(axis.white.value),
-                    interval(&axis.white),
-                    exponent(axis.walk.value),
-                    interval(&axis.walk),
-                    walk_unit(sensor.quantity)
-                ));
-                for process in &axis.processes {
-                    lines.push(format!(
-                        "{}: Gauss-Markov drift of sigma {} {unit}, Tc {} s",
-                        axis.name,
-                        exponent(process.std_dev),
-                        digits(process.correlation_time)
-                    ));
-                }
-                lines.extend(axis.note());
-                if !axis.left_out.is_empty() {
-                    lines.push(format!("{}: left out, no field for it: {}", axis.name, axis.left_out.join(", ")));
-                }
-            }
-        }
-        lines.push(
-            match self.measured_inflation.is_empty() {
-                true => "identified at rest: a lower bound of what a moving vehicle shows",
-                false => "drift as identified at rest: a lower bound of what a moving vehicle shows",
-            }
-            .into(),
-        );
-        lines.extend(self.measured_inflation.iter().cloned());
-        lines.push(match (self.inflation == 1.0, self.measured_inflation.is_empty()) {
-            (true, true) => "inflation: none".into(),
-            (true, false) => "inflation: none beyond that".into(),
-            (false, _) => {
-                format!("inflation: N and K (and sigma) below are {} times those above", digits(self.inflation))
-            }
-        });
-        lines.iter().map(|line| format!("{mark} {line}\n")).collect()
-    }
-
-    /// About a consumer that knows no other drift than a walk.
-    fn walk_words(&self) -> Vec<String> {
-        let mut words = vec![self.walk.words()];
-        words.extend(self.price.iter().cloned());
-        words.extend(self.axes().filter_map(|axis| axis.walk_note(self.walk)));
-        words
-    }
-
     /// About one number for several axes.
     fn choice_words(&self) -> String {
         match &self.choice {
+            Choice::Worst if self.walk == Walk::Least => {
+                "one number for all axes: the largest, and the walk that costs least where it is dearest".into()
+            }
             Choice::Worst => "one number for all axes: the largest".into(),
             Choice::Mean => "one number for all axes: the root mean square".into(),
             Choice::Axis(name) => format!("one number for all axes: that of {name}"),
         }
     }
+}
 
-    /// A head for consumers of one white number and one walk.
-    fn walk_head(&self, mark: &str, interpretation: &[&str]) -> String {
-        let words = self.walk_words();
-        let choice = self.choice_words();
-        let lines: Vec<&str> =
-            interpretation.iter().copied().chain(words.iter().map(String::as_str)).chain([choice.as_str()]).collect();
-        self.head(mark, &lines)
+/// "the gyro" in sentences.
+fn device(quantity: Quantity) -> &'static str {
+    match quantity {
+        Quantity::AngularRate => "gyro",
+        Quantity::SpecificForce => "accelerometer",
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::super::selection::FIT_LEVEL;
 use super::super::shape::{Role, document_name};
-use super::super::{LENGTHS_TO_TELL, WIDEST_INTERVAL, coefficient_unit, worth_recording};
+use super::super::{LENGTHS_TO_TELL, WIDEST_INTERVAL, coefficient_unit, worth_recording, would_have_shown};
 use super::CLOSE;
 use super::form::Piece;
 use super::growth::score;
@@ -12,7 +12,7 @@ use super::ordinates::Ordinates;
 use super::whittle::{self, Fit};
 use crate::noise::{Kind, Term};
 use crate::numerics::distribution::{NORMAL_90, NORMAL_95};
-use crate::params::NotIdentified;
+use crate::params::{Measured, NotIdentified};
 use crate::units::{Unit, digits};
 
 /// Sentences about one axis, numbers in the unit of the log.
@@ -71,6 +71,7 @@ impl Words<'_> {
             term: name_of(&fit.form, index),
             reason: format!("{reason}, model {}", fit.form.label()),
             needed_log_s: worth_recording(needed, self.data.total_s()),
+            upper_limit: None,
         }
     }
 
@@ -114,6 +115,7 @@ impl Words<'_> {
                     own.form.label(),
                 ),
                 needed_log_s: estimate.map(|time| (LENGTHS_TO_TELL * time).max(4.0 * self.data.total_s())),
+                upper_limit: None,
             });
         }
         found
@@ -125,14 +127,17 @@ impl Words<'_> {
         if slow.iter().any(|kind| fit.form.has(*kind)) {
             return vec![];
         }
-        let limit = self.largest_walk(fit).map_or_else(String::new, |density| {
-            let unit = coefficient_unit(Kind::RateRandomWalk, self.display);
-            format!("; a random walk above {} {unit} would have shown (95 %)", digits(unit.from_si(density)))
-        });
+        let unit = coefficient_unit(Kind::RateRandomWalk, self.display);
+        let limit = self.largest_walk(fit).map(|density| Measured::from_si(density, None, unit));
         vec![NotIdentified {
             term: document_name(Kind::RateRandomWalk).into(),
-            reason: format!("no drift is seen above the white noise in {} s{limit}", digits(self.data.total_s())),
+            reason: format!(
+                "no drift is seen above the white noise in {} s{}",
+                digits(self.data.total_s()),
+                would_have_shown(limit.as_ref())
+            ),
             needed_log_s: None,
+            upper_limit: limit,
         }]
     }
 

@@ -9,6 +9,7 @@ use anyhow::{Context, anyhow, bail};
 use super::Status;
 use super::flags::with_unit;
 use super::output::{digits, print_text};
+use crate::cli::checked;
 use crate::export::atomic;
 use crate::export::consumer::{Choice, Export, Sensor, Target, Walk, write};
 use crate::params::Params;
@@ -106,6 +107,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         sample_rate_hz: 0.0,
         inflation: args.inflate.unwrap_or(1.0),
         measured_inflation: Vec::new(),
+        failed: Vec::new(),
         choice: match args.axis.as_deref().unwrap_or("worst") {
             "worst" => Choice::Worst,
             "mean" => Choice::Mean,
@@ -120,7 +122,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         if let Some(output) = &args.output {
             atomic::refuse_input_as_output(output, path)?;
         }
-        let params = Params::read(path)?;
+        let params = checked::params(path)?;
         if !given.is_empty() && params.quantity != Quantity::SpecificForce {
             bail!(
                 "{given}{}: the parameters are of an {}, expected a specific force",
@@ -148,6 +150,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
 fn add(export: &mut Export, path: &Path, params: &Params) -> anyhow::Result<()> {
     let shown = path.display().to_string();
     let sensor = Sensor::new(params, export.walk).map_err(|message| anyhow!(message)).with_context(|| shown.clone())?;
+    export.failed.extend(params.failed_check());
     let source = params.source.clone().unwrap_or_default();
     let log = source.log.map_or_else(String::new, |log| format!(", from {log}"));
     let hash = source.sha256.map_or_else(String::new, |hash| format!(" (sha256 {hash})"));

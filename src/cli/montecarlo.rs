@@ -18,9 +18,9 @@ use signal_hook::flag;
 use super::Status;
 use super::flags::{whole, with_unit};
 use super::output::{digits, print_text, progress, refuse_same_output};
+use crate::cli::checked;
 use crate::consistency::Verdict;
 use crate::export::{atomic, junit};
-use crate::filter::FilterDesign;
 use crate::montecarlo::calibration::{self, MAX_REPLICATES, MAX_RUN, REPLICATES};
 use crate::montecarlo::course::{MAX_STEPS, MIN_STEPS};
 use crate::montecarlo::document::{self, Shard};
@@ -28,7 +28,6 @@ use crate::montecarlo::every_step::MAX_EVERY_STEP;
 use crate::montecarlo::gate::Gate;
 use crate::montecarlo::power::{self, Mistuning};
 use crate::montecarlo::{Course, Experiment, Outcome, Runs, Totals, conclude};
-use crate::params::Params;
 use crate::units::Dimension;
 
 /// Time between two writes of unfinished work.
@@ -126,8 +125,8 @@ struct Outputs {
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let inputs: Vec<&Path> = std::iter::once(args.filter.as_path()).chain(args.truth.as_deref()).collect();
     args.outputs.check(&inputs, &args.every_step)?;
-    let design = FilterDesign::read(&args.filter)?;
-    let truth = args.truth.as_deref().map(Params::read).transpose()?;
+    let design = checked::design(&args.filter)?;
+    let truth = args.truth.as_deref().map(checked::params).transpose()?;
     let duration_s = with_unit("--duration", &args.duration, Dimension::TIME, "600s")?;
     let steps = (duration_s * design.sample_rate_hz).round();
     if !(MIN_STEPS as f64..=MAX_STEPS as f64).contains(&steps) {

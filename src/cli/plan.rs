@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::Status;
 use super::output::{digits, duration, notes_of_rate, print_json, print_text, table};
+use crate::cli::checked;
 use crate::export::atomic;
 use crate::identify::plan::{LONGEST_S, Planned, Sampling, Thinning};
 use crate::noise::NoiseModel;
@@ -113,7 +114,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if let Some(output) = &args.output {
         atomic::check_output(output, &args.params)?;
     }
-    let params = Params::read(&args.params)?;
+    let params = checked::params(&args.params)?;
     let precision = share(&args.precision)?;
     let rate_hz = args.rate.unwrap_or(params.sample_rate_hz);
     if !(rate_hz.is_finite() && rate_hz > 0.0) {

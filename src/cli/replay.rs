@@ -14,6 +14,7 @@ use super::flags::with_unit;
 use super::log_flags::{LogFlags, print_check};
 use super::output::{digits, print_json, print_text, progress, refuse_same_output, shown_unit, table};
 use super::tests_table::{TESTS, caption, rows};
+use crate::cli::checked;
 use crate::consistency::{Test, Verdict};
 use crate::export::atomic::{AtomicFile, refuse_input_as_output};
 use crate::export::table::TableWriter;
@@ -108,7 +109,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         return attitude::run(args);
     }
     args.attitude.refuse()?;
-    let design = FilterDesign::read(&args.filter)?;
+    let design = checked::design(&args.filter)?;
     for output in [&args.output, &args.report, &args.plot].into_iter().flatten() {
         refuse_input_as_output(output, &args.log)?;
         refuse_input_as_output(output, &args.filter)?;

@@ -9,6 +9,7 @@ use super::Status;
 use super::flags::{whole, with_unit};
 use super::output::{digits, notes_of_rate, print_json, print_text, progress, shown_unit, table};
 use super::tune::plant_flags::PlantFlags;
+use crate::cli::checked;
 use crate::export::atomic;
 use crate::export::table::TableWriter;
 use crate::input::{self, LogOptions};
@@ -100,7 +101,7 @@ struct AxisSummary {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
-    let params = Params::read(&args.params)?;
+    let params = checked::params(&args.params)?;
     atomic::refuse_input_as_output(&args.output, &args.params)?;
     let scenario = scenario(args, &params)?;
     eprint!("{}", notes_of_rate(&params, &params.axes.iter().collect::<Vec<_>>(), scenario.rate_hz));

@@ -23,6 +23,7 @@ use super::Status;
 use super::flags::whole;
 use super::log_flags::LogFlags;
 use super::output::{print_json, print_text, progress, refuse_same_output};
+use crate::cli::checked;
 use crate::consistency::Verdict;
 use crate::export::atomic;
 use crate::montecarlo::{Outcome, Plan, verify};
@@ -109,7 +110,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
             atomic::check_output(output, input)?;
         }
     }
-    let params = Params::read(params_path)?;
+    let params = checked::params(params_path)?;
     let name = params_path.display().to_string();
     let design = args.plant.design(&params)?;
     let attitude = design.as_ref().or(params.design.as_ref()).filter(|d| matches!(d.plant, PlantEntry::Attitude(_)));
@@ -185,7 +186,7 @@ struct Truth {
 impl Truth {
     fn read(path: &Path, tuned: &Tuned, options: &TuneOptions) -> anyhow::Result<Truth> {
         let name = path.display().to_string();
-        let axes = under_truth(tuned, &Params::read(path)?, options).with_context(|| name.clone())?;
+        let axes = under_truth(tuned, &checked::params(path)?, options).with_context(|| name.clone())?;
         Ok(Truth { name, axes })
     }
 }

@@ -5,6 +5,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::{Args, FormFlag, Status};
 use crate::cli::aid_columns::column_and_unit;
+use crate::cli::checked;
 use crate::cli::log_flags::print_check;
 use crate::cli::output::{digits, print_json, print_text, progress, table};
 use crate::consistency::Verdict;
@@ -74,6 +75,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         bail!("{flag} is made for linear filters, {} is an attitude filter", args.filter.display());
     }
     let design = AttitudeDesign::read(&args.filter)?;
+    checked::say(&args.filter, checked::recorded(&design.tuning));
     for output in args.output.iter() {
         refuse_input_as_output(output, &args.log)?;
         refuse_input_as_output(output, &args.filter)?;

@@ -47,6 +47,8 @@ pub struct Export {
     pub sample_rate_hz: f64,
     /// Factor on every white density and every drift; 1 is none.
     pub inflation: f64,
+    /// What the logs behind the parameters have failed; see [`crate::params::Source::failed`].
+    pub failed: Vec<String>,
     /// Lines about the factors that the white noise of the parameters has in it already.
     pub measured_inflation: Vec<String>,
     pub choice: Choice,
@@ -158,13 +160,14 @@ impl Export {
                 }
             }
         }
-        lines.push(
-            match self.measured_inflation.is_empty() {
-                true => "identified at rest: a lower bound of what a moving vehicle shows",
-                false => "drift as identified at rest: a lower bound of what a moving vehicle shows",
-            }
-            .into(),
-        );
+        // a log that moved says nothing of the sensor at rest
+        let rest = match self.measured_inflation.is_empty() {
+            _ if !self.failed.is_empty() => None,
+            true => Some("identified at rest: a lower bound of what a moving vehicle shows"),
+            false => Some("drift as identified at rest: a lower bound of what a moving vehicle shows"),
+        };
+        lines.extend(rest.map(String::from));
+        lines.extend(self.failed.iter().map(|failed| format!("identified although a check failed: {failed}")));
         lines.extend(self.measured_inflation.iter().cloned());
         lines.push(match (self.inflation == 1.0, self.measured_inflation.is_empty()) {
             (true, true) => "inflation: none".into(),

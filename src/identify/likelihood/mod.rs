@@ -27,7 +27,7 @@ use rayon::prelude::*;
 use super::shape::Role;
 use super::{Candidate, Identified, IdentifyError, ModelChoice, Precision as Known, bias, entry, usable};
 use crate::allan::{self, AllanCurve, Deviation, Pooled, TauGrid, deviation};
-use crate::consistency::spectrum::departure;
+use crate::consistency::spectrum::{Departure, departure};
 use crate::filter::likelihood::{LogLikelihood, Stretch};
 use crate::noise::{Kind, NoiseModel, Term};
 use crate::numerics::distribution::NORMAL_95;
@@ -149,7 +149,7 @@ impl Whole<'_> {
             not_identified.extend(words.no_drift(fit));
         }
         let sums = sums::sums(&data, fit, refined.as_ref().and_then(|refined| refined.information.as_ref()));
-        let fit_p_value = goodness(&data, fit);
+        let Departure { p_value: fit_p_value, distance, .. } = goodness(&data, fit);
         let candidate = |(i, (fit, known)): (usize, &(Fit, Vec<Precision>))| Candidate {
             model: fit.form.label(),
             parameters: fit.form.parameters(),
@@ -196,6 +196,7 @@ impl Whole<'_> {
             not_identified,
             steps: vec![],
             fit_p_value,
+            fit_distance: Some(distance.abs()),
             first_tau_s: None,
             curve,
         })
@@ -489,10 +490,10 @@ fn known_precision(terms: &[Found]) -> Vec<Known> {
     all
 }
 
-/// Probability that the cumulative spectrum of the log, divided by that of the model, departs from a straight line as it does.
-fn goodness(data: &Ordinates, fit: &Fit) -> f64 {
+/// How the cumulative spectrum of the log, divided by that of the model, departs from a straight line.
+fn goodness(data: &Ordinates, fit: &Fit) -> Departure {
     let of = |(bin, s): (&ordinates::Bin, &f64)| (bin.count, bin.left(fit.slope) / s);
-    departure(&data.bins.iter().zip(&fit.spectrum(data)).map(of).collect::<Vec<_>>()).p_value
+    departure(&data.bins.iter().zip(&fit.spectrum(data)).map(of).collect::<Vec<_>>())
 }
 
 /// The best score among models whose parameters are known; a model that is close in score takes its place when it foretells the last third of the log

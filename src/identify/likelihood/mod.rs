@@ -266,6 +266,9 @@ fn whole(data: &Ordinates, fits: &mut [(Fit, Vec<Precision>)], chosen: usize) {
 /// Fits of the models that come into question, best score first, with what is known of their drift.
 fn fits(data: &Ordinates, choice: &ModelChoice) -> Vec<(Fit, Vec<Precision>)> {
     let known = |fit: Fit| {
+        // once more within the bounds around where the lines have come to
+        let again = fit.form.has(Kind::Oscillation).then(|| whittle::climb_all(data, &fit.form, &fit.logs)).flatten();
+        let fit = again.filter(|again| again.log_likelihood > fit.log_likelihood).unwrap_or(fit);
         let known = drift_precisions(data, &fit);
         (fit, known)
     };
@@ -307,7 +310,7 @@ fn refine(
     start: &Fit,
     logs: &[Vec<Stretch<'_>>],
 ) -> (Fitted, Option<Refined>) {
-    let bounds = whittle::bounds(data, &start.form, &start.logs);
+    let bounds = whittle::bounds_around(data, &start.form, &start.logs);
     let exact = Exact::new(data, &start.form, &start.logs, logs).filter(|_| !logs.is_empty());
     let refined = exact.and_then(|exact| exact.refine(&start.logs, &bounds));
     // a steady tone is no oscillation of any width that is searched: there the two likelihoods differ by more than either knows
@@ -341,7 +344,9 @@ fn moved(
 ) -> Vec<Precision> {
     let samples: usize = logs.iter().flatten().map(|part| part.samples.len()).sum();
     let more = samples as f64 * data.dt / data.total_s();
-    let sigmas = refined.information.clone().map(interval::deviations);
+    let ended = interval::ended(before, &whittle::bounds_around(data, &before.form, &before.logs));
+    let inside: Vec<usize> = (0..ended.len()).filter(|i| !ended[*i]).collect();
+    let sigmas = refined.information.as_ref().map(|all| interval::deviations_of(all, &inside));
     let endless = interval::endless(&before.form, known);
     let of = |(i, old): (usize, &Precision)| {
         let (from, to) = (before.logs[i], refined.logs[i]);
@@ -432,6 +437,9 @@ struct Found {
 /// The terms but for drift that is not identified.
 fn known_terms(data: &Ordinates, fit: &Fit, known: &[Precision]) -> Vec<Found> {
     let unknown = unknown(data, fit, known);
+    let bounds = whittle::bounds_around(data, &fit.form, &fit.logs);
+    // the shortest that is searched is no estimate
+    let interval = |i: usize| known[i].interval().filter(|_| !interval::shortest(fit, &bounds, i));
     let mut first = 0;
     let mut found = Vec::new();
     for (piece, own) in fit.form.split(&fit.logs) {
@@ -449,7 +457,7 @@ fn known_terms(data: &Ordinates, fit: &Fit, known: &[Precision]) -> Vec<Found> {
                 found.extend(floor.map(|term| Found { term, intervals: vec![], precision: vec![[f64::INFINITY; 2]] }));
                 found.push(Found {
                     term,
-                    intervals: of.iter().map(|p| p.interval().map(|limits| limits.map(f64::exp))).collect(),
+                    intervals: indices.clone().map(|i| interval(i).map(|limits| limits.map(f64::exp))).collect(),
                     precision: of.iter().map(|p| [p.sigma, p.bound]).collect(),
                 })
             }
@@ -496,11 +504,16 @@ fn goodness(data: &Ordinates, fit: &Fit) -> Departure {
     departure(&data.bins.iter().zip(&fit.spectrum(data)).map(of).collect::<Vec<_>>())
 }
 
-/// The best score among models whose parameters are known; a model that is close in score takes its place when it foretells the last third of the log
+/// The best score among models whose parameters are known, those of several vague processes only where no simpler one is there; a model that is close in score takes its place when it foretells the last third of the log
 /// clearly better.
 fn choice_of(data: &Ordinates, fits: &[(Fit, Vec<Precision>)], held_out: &[Option<f64>]) -> usize {
-    let identified = |i: &usize| told(data, &fits[*i].0, &fits[*i].1);
-    let Some(first) = (0..fits.len()).find(identified) else { return 0 };
+    let told = |i: &usize| told(data, &fits[*i].0, &fits[*i].1);
+    let Some(best) = (0..fits.len()).find(told) else { return 0 };
+    let clear = |i: &usize| told(i) && !interval::vague(data, &fits[*i].0, &fits[*i].1);
+    let simpler = |i: &usize| fits[*i].0.form.parameters() < fits[best].0.form.parameters();
+    let choose_clear = clear(&best) || (0..fits.len()).filter(simpler).any(|i| clear(&i));
+    let identified = |i: &usize| if choose_clear { clear(i) } else { told(i) };
+    let Some(first) = (0..fits.len()).find(identified) else { return best };
     let foretold = |i: usize| held_out.get(i).copied().flatten();
     let Some(known) = foretold(first) else { return first };
     (first..fits.len())

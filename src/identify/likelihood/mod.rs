@@ -259,6 +259,12 @@ fn choose(
 /// All that is known of the parameters of one of the fits.
 fn whole(data: &Ordinates, fits: &mut [(Fit, Vec<Precision>)], chosen: usize) {
     if let Some((fit, known)) = fits.get_mut(chosen) {
+        // once more within the bounds around where its lines have come to
+        let again = fit.form.has(Kind::Oscillation).then(|| whittle::climb_all(data, &fit.form, &fit.logs)).flatten();
+        if let Some(again) = again.filter(|again| again.log_likelihood > fit.log_likelihood + whittle::WELL) {
+            *fit = again;
+            *known = drift_precisions(data, fit);
+        }
         *known = completed(data, fit, known);
     }
 }
@@ -266,9 +272,6 @@ fn whole(data: &Ordinates, fits: &mut [(Fit, Vec<Precision>)], chosen: usize) {
 /// Fits of the models that come into question, best score first, with what is known of their drift.
 fn fits(data: &Ordinates, choice: &ModelChoice) -> Vec<(Fit, Vec<Precision>)> {
     let known = |fit: Fit| {
-        // once more within the bounds around where the lines have come to
-        let again = fit.form.has(Kind::Oscillation).then(|| whittle::climb_all(data, &fit.form, &fit.logs)).flatten();
-        let fit = again.filter(|again| again.log_likelihood > fit.log_likelihood).unwrap_or(fit);
         let known = drift_precisions(data, &fit);
         (fit, known)
     };

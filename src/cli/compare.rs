@@ -12,6 +12,7 @@ use super::output::{digits, notes, print_json, print_text, say, table};
 use super::stretch::stretches;
 use super::tests_table::{TESTS, caption, rows};
 use super::{Status, VerdictFlags};
+use crate::cli::checked;
 use crate::compare::parameters::parameters;
 use crate::compare::{self, AxisComparison, Beside, Comparison, Log, LogAxis};
 use crate::export::atomic;
@@ -119,7 +120,7 @@ fn one_for_all(params: &mut Params, log: &[LogAxis]) {
 /// Parameters of one sensor, or of the two that a file of another program may have.
 fn given(path: &Path) -> anyhow::Result<Vec<Params>> {
     if !import::knows(path) {
-        return Ok(vec![Params::read(path)?]);
+        return Ok(vec![checked::params(path)?]);
     }
     let found = import::read(path, None).map_err(|error| match &error {
         ImportError::Rate { path, why } => {

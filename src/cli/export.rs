@@ -10,6 +10,7 @@ use super::Status;
 use super::files::{self, Kind};
 use super::flags::with_unit;
 use super::output::{digits, print_text, say};
+use crate::cli::checked;
 use crate::export::atomic;
 use crate::export::consumer::{Choice, Export, Target, Walk, write};
 use crate::params::Params;
@@ -112,6 +113,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         sample_rate_hz: 0.0,
         inflation: args.inflate.unwrap_or(1.0),
         measured_inflation: Vec::new(),
+        failed: Vec::new(),
         choice: match args.axis.as_deref().unwrap_or("worst") {
             "worst" => Choice::Worst,
             "mean" => Choice::Mean,
@@ -123,7 +125,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     };
     for (path, given) in [(Some(&args.params), ""), (args.accelerometer.as_ref(), "--accelerometer ")] {
         let Some(path) = path else { continue };
-        let params = Params::read(path)?;
+        let params = checked::params(path)?;
         if !given.is_empty() && params.quantity != Quantity::SpecificForce {
             bail!(
                 "{given}{}: the parameters are of an {}, expected a specific force",
@@ -150,6 +152,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
 /// One sensor of the unit with what is said of its origin.
 fn add(export: &mut Export, path: &Path, params: &Params) -> anyhow::Result<()> {
     let shown = path.display().to_string();
+    export.failed.extend(params.failed_check());
     let source = params.source.clone().unwrap_or_default();
     let log = source.log.map_or_else(String::new, |log| format!(", from {log}"));
     let hash = source.sha256.map_or_else(String::new, |hash| format!(" (sha256 {hash})"));

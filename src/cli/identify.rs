@@ -1,5 +1,6 @@
 //! `kfdesign identify`.
 
+mod checks;
 mod sight;
 pub(super) mod tables;
 mod temperature;
@@ -256,6 +257,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
             version: Some(env!("CARGO_PKG_VERSION").into()),
             note: None,
             inflation: Vec::new(),
+            checks: checks::checks(&log.checks, &axes),
         }),
     };
     if let Some(path) = &args.output {
@@ -277,7 +279,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         text.extend(shared.as_ref().map(shared_words));
         print_text(&text.join("\n"));
     }
-    Ok(Status::Done)
+    Ok(checks::status(&params, args.output.as_deref()))
 }
 
 /// The logs in memory at once.

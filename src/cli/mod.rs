@@ -6,6 +6,7 @@
 mod aid_columns;
 pub mod allan;
 mod allan_figure;
+mod checked;
 pub mod compare;
 pub mod completions;
 pub mod datasheet;

@@ -15,8 +15,8 @@ use super::files::{self, Kind};
 use super::flags::{whole, with_unit};
 use super::output::{digits, print_text, progress};
 use super::{Status, Stop, VerdictFlags};
+use crate::cli::checked;
 use crate::export::{atomic, junit};
-use crate::filter::FilterDesign;
 use crate::montecarlo::calibration::{self, MAX_REPLICATES, MAX_RUN, REPLICATES};
 use crate::montecarlo::course::{MAX_STEPS, MIN_STEPS};
 use crate::montecarlo::document::{self, Shard};
@@ -25,7 +25,6 @@ use crate::montecarlo::experiment::default_steps;
 use crate::montecarlo::gate::Gate;
 use crate::montecarlo::power::{self, Mistuning};
 use crate::montecarlo::{Course, Experiment, Outcome, Runs, Totals, conclude};
-use crate::params::Params;
 use crate::units::Dimension;
 
 /// Time between two writes of unfinished work.
@@ -129,8 +128,8 @@ pub(super) fn run(args: &Args, stop: &Stop) -> anyhow::Result<Status> {
     let inputs: Vec<&Path> = std::iter::once(args.filter.as_path()).chain(args.truth.as_deref()).collect();
     let kind = if args.run.is_some() { Kind::Table } else { Kind::Json };
     args.outputs.check(&inputs, kind, &args.every_step)?;
-    let design = FilterDesign::read(&args.filter)?;
-    let truth = args.truth.as_deref().map(Params::read).transpose()?;
+    let design = checked::design(&args.filter)?;
+    let truth = args.truth.as_deref().map(checked::params).transpose()?;
     let steps = match &args.duration {
         Some(text) => steps(text, design.sample_rate_hz)?,
         None => default_steps(&design),

@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::Status;
 use super::files::{self, Kind};
 use super::output::{digits, duration, notes_of_rate, print_json, print_text, say_all, table};
+use crate::cli::checked;
 use crate::export::atomic;
 use crate::identify::plan::{LONGEST_S, Planned, Sampling, Thinning};
 use crate::noise::NoiseModel;
@@ -112,7 +113,7 @@ struct Hours {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     files::check(&[("-o", &args.output, Kind::Json)], &[&args.params])?;
-    let params = Params::read(&args.params)?;
+    let params = checked::params(&args.params)?;
     let precision = share(&args.precision)?;
     let rate_hz = args.rate.unwrap_or(params.sample_rate_hz);
     if !(rate_hz.is_finite() && rate_hz > 0.0) {

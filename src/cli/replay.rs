@@ -16,6 +16,7 @@ use super::tests_table::{TESTS, caption, rows};
 use super::{Status, VerdictFlags};
 use crate::consistency::Test;
 use crate::export::atomic;
+use crate::cli::checked;
 use crate::export::table::TableWriter;
 use crate::filter::{AttitudeDesign, FilterDesign, Form};
 use crate::identify::Followed;
@@ -112,7 +113,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         return attitude::run(args);
     }
     args.attitude.refuse()?;
-    let design = FilterDesign::read(&args.filter)?;
+    let design = checked::design(&args.filter)?;
     let extra = aid_columns(&args.aid, &design).with_context(|| args.filter.display().to_string())?;
     let extra_columns = extra.len();
     let mut reader = LogReader::open(&args.log, &LogOptions { extra, ..args.reading.rates()? })?;

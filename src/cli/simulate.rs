@@ -10,6 +10,7 @@ use super::files::{self, Kind};
 use super::flags::{whole, with_unit};
 use super::output::{digits, notes_of_rate, print_json, print_text, progress, say_all, shown_unit, table};
 use super::tune::plant_flags::PlantFlags;
+use crate::cli::checked;
 use crate::export::table::TableWriter;
 use crate::input::{self, LogOptions};
 use crate::numerics::reduce::Moments;
@@ -103,7 +104,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let motion = args.true_rate.strip_prefix("file:").map(Path::new);
     let inputs: Vec<&Path> = std::iter::once(args.params.as_path()).chain(motion).collect();
     files::check(&[("-o", &Some(args.output.clone()), Kind::Table)], &inputs)?;
-    let params = Params::read(&args.params)?;
+    let params = checked::params(&args.params)?;
     let scenario = scenario(args, &params)?;
     say_all(&notes_of_rate(&params, &params.axes.iter().collect::<Vec<_>>(), scenario.rate_hz));
     let unit = match &args.unit {

@@ -24,6 +24,7 @@ use super::flags::whole;
 use super::log_flags::LogFlags;
 use super::output::{print_json, print_text, progress, say};
 use super::{Status, VerdictFlags};
+use crate::cli::checked;
 use crate::consistency::Verdict;
 use crate::export::atomic;
 use crate::montecarlo::{Outcome, Plan, verify};
@@ -111,7 +112,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let inputs: Vec<&Path> =
         std::iter::once(params_path).chain(&args.log).chain(&args.truth).map(PathBuf::as_path).collect();
     files::check(&outputs, &inputs)?;
-    let params = Params::read(params_path)?;
+    let params = checked::params(params_path)?;
     let name = params_path.display().to_string();
     let design = args.plant.design(&params)?;
     let attitude = design.as_ref().or(params.design.as_ref()).filter(|d| matches!(d.plant, PlantEntry::Attitude(_)));
@@ -186,7 +187,7 @@ struct Truth {
 impl Truth {
     fn read(path: &Path, tuned: &Tuned, options: &TuneOptions) -> anyhow::Result<Truth> {
         let name = path.display().to_string();
-        let axes = under_truth(tuned, &Params::read(path)?, options).with_context(|| name.clone())?;
+        let axes = under_truth(tuned, &checked::params(path)?, options).with_context(|| name.clone())?;
         Ok(Truth { name, axes })
     }
 }

@@ -96,6 +96,7 @@ pub(super) fn identify(
         warnings,
         steps: vec![],
         fit_p_value: fit.p_value(),
+        fit_distance: None,
         first_tau_s: Some(table.points.first_tau_s()),
         samples: rate.len(),
         curve,

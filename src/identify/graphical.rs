@@ -124,6 +124,7 @@ pub(super) fn identify(name: &str, rate: &[f64], dt: f64, display: &Unit) -> Res
         warnings,
         steps,
         fit_p_value: f64::NAN,
+        fit_distance: None,
         first_tau_s: Some(dt),
         samples: rate.len(),
     })

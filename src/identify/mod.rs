@@ -17,10 +17,11 @@ pub use likelihood::{Fitted, plan, temperature, windows};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::allan::AllanCurve;
+use crate::allan::{AllanCurve, AllanPoint};
+use crate::consistency::effect::{PERIODOGRAM_TOLERANCE, VARIANCE_RATIO_TOLERANCE};
 use crate::filter::likelihood::Stretch;
 use crate::noise::{Kind, NoiseModel, Term};
-use crate::params::{AxisParams, Measured, NotIdentified, TermEntry};
+use crate::params::{AxisParams, Check, Measured, NotIdentified, TermEntry};
 use crate::units::{Unit, digits};
 pub use likelihood::shared::{SharedTime, TimeProfile, shared_time};
 pub use likelihood::sums::{Sum, Sums, counts_as_white};
@@ -138,10 +139,59 @@ pub struct Identified {
     pub steps: Vec<graphical::Step>,
     /// p-value of the chosen model's fit (NaN for graphical).
     pub fit_p_value: f64,
+    /// Likelihood only: distance of the cumulative periodogram of the log over the model's spectrum from a straight line.
+    pub fit_distance: Option<f64>,
     /// Shortest averaging time that an Allan fit used, s.
     pub first_tau_s: Option<f64>,
     /// From which the parameters are.
     pub samples: usize,
+}
+
+/// A fit that one true model in a million has.
+const SURELY_MISSED: f64 = 1e-6;
+
+impl Identified {
+    /// The fit misses the log surely (p below 10⁻⁶) and by more than is tolerated of a measured log in `compare` and `replay`: a tenth of the cumulative periodogram, of
+    /// the methods on curves a factor of 1.3 of the Allan variance where its own interval does not hold the model's. The second keeps logs that are so long that every model is seen to be one.
+    pub fn missed(&self) -> Option<Check> {
+        let (name, effect, tolerated, words) = match self.fit_distance {
+            Some(distance) => {
+                let words = format!("the cumulative periodogram departs by {} from a straight line", digits(distance));
+                ("periodogram_distance", distance, PERIODOGRAM_TOLERANCE, words)
+            }
+            None => {
+                let ratio = self.farthest();
+                let words = format!("the Allan variance is up to {} times off", digits(ratio));
+                ("variance_ratio", ratio, VARIANCE_RATIO_TOLERANCE, words)
+            }
+        };
+        // not so of a p-value that is not a number: the graphical recipe has none
+        (self.fit_p_value < SURELY_MISSED && effect > tolerated).then(|| Check {
+            kind: Check::FIT.into(),
+            axis: Some(self.params.name.clone()),
+            message: format!(
+                "{}: the model does not explain the log: {words}, tolerated {} (p = {})",
+                self.params.name,
+                digits(tolerated),
+                digits(self.fit_p_value)
+            ),
+            numbers: [("p_value", self.fit_p_value), (name, effect), ("tolerated", tolerated)]
+                .map(|(name, value)| (name.to_string(), value))
+                .into(),
+        })
+    }
+
+    /// Largest ratio, either way, of the log's Allan variance and the model's, of averaging times that were used and whose interval does not hold the model's.
+    fn farthest(&self) -> f64 {
+        let from = self.first_tau_s.unwrap_or(0.0);
+        let ratio = |point: &AllanPoint| {
+            let model = self.model.allan_variance(point.m, self.curve.dt);
+            let outside = point.lower.powi(2) > model || point.upper.powi(2) < model;
+            let ratio = point.deviation.powi(2) / model;
+            if outside { ratio.max(1.0 / ratio) } else { 1.0 }
+        };
+        self.curve.points.iter().filter(|point| point.tau_s >= from).map(ratio).fold(1.0, f64::max)
+    }
 }
 
 #[derive(Clone, Debug, thiserror::Error)]

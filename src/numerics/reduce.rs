@@ -54,6 +54,10 @@ impl Moments {
         self.m2 += other.m2 + delta * delta * self.count as f64 * weight;
         self.count = count;
     }
+    /// Sum of squares about the mean.
+    pub fn squares(&self) -> f64 {
+        self.m2
+    }
     /// Unbiased variance (n − 1); NaN below two samples.
     pub fn variance(&self) -> f64 {
         if self.count < 2 { f64::NAN } else { self.m2 / (self.count - 1) as f64 }

@@ -7,7 +7,9 @@ use serde::{Serialize, Serializer};
 
 use super::measured::Range;
 use super::place::{KeyError, Object, Place};
-use super::{AxisParams, Design, Inflated, Measured, NotIdentified, Params, Source, TemperatureEffect, TermEntry};
+use super::{
+    AxisParams, Check, Design, Inflated, Measured, NotIdentified, Params, Source, TemperatureEffect, TermEntry,
+};
 use crate::noise::Filter;
 use crate::units::{Dimension, Quantity, Unit};
 
@@ -218,6 +220,9 @@ struct SourceDocument {
     /// What the white noise was multiplied with after the bench, by axis.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     inflation: Vec<Inflated>,
+    /// Checks that the log, or the fit to it, has failed; none: nothing was found.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    checks: Vec<Check>,
 }
 
 fn in_unit(value: f64, unit: &str) -> Option<Measured> {
@@ -303,6 +308,7 @@ impl From<&Source> for SourceDocument {
             version: source.version.clone(),
             note: source.note.clone(),
             inflation: source.inflation.clone(),
+            checks: source.checks.clone(),
         }
     }
 }
@@ -506,7 +512,8 @@ fn seconds(object: &Object<'_>, key: &str) -> Result<Option<f64>, KeyError> {
 }
 
 fn source(place: &Place<'_>) -> Result<Source, KeyError> {
-    let object = place.object(&["log", "sha256", "samples", "span", "method", "version", "note", "inflation"])?;
+    let object =
+        place.object(&["log", "sha256", "samples", "span", "method", "version", "note", "inflation", "checks"])?;
     let text = |key: &str| object.optional(key).map(|p| p.text().map(str::to_string)).transpose();
     Ok(Source {
         log: text("log")?,
@@ -520,6 +527,21 @@ fn source(place: &Place<'_>) -> Result<Source, KeyError> {
             Some(list) => list.list()?.iter().map(inflated).collect::<Result<_, _>>()?,
             None => Vec::new(),
         },
+        checks: match object.optional("checks") {
+            Some(list) => list.list()?.iter().map(check).collect::<Result<_, _>>()?,
+            None => Vec::new(),
+        },
+    })
+}
+
+fn check(place: &Place<'_>) -> Result<Check, KeyError> {
+    let object = place.object(&["kind", "axis", "message", "numbers"])?;
+    let numbers = object.optional("numbers").map(|numbers| numbers.entries()).transpose()?.unwrap_or_default();
+    Ok(Check {
+        kind: object.required("kind")?.text()?.to_string(),
+        axis: object.optional("axis").map(|p| p.text().map(str::to_string)).transpose()?,
+        message: object.required("message")?.text()?.to_string(),
+        numbers: numbers.iter().map(|(name, p)| Ok((name.to_string(), p.number()?))).collect::<Result<_, _>>()?,
     })
 }
 

@@ -9,6 +9,7 @@ mod document;
 mod measured;
 pub mod place;
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use schemars::JsonSchema;
@@ -87,6 +88,28 @@ pub struct Inflated {
     pub interval: [f64; 2],
 }
 
+/// A check that the log, or the fit to it, has failed; or (`calm`) what part of such a log is at rest.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Check {
+    /// "motion": the log is not at rest all the time; "fit": the model misses the spectrum of the log; "calm": the part to identify instead.
+    pub kind: String,
+    /// None: the log as a whole.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub axis: Option<String>,
+    /// One sentence with numbers and units.
+    pub message: String,
+    /// The numbers behind it, by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub numbers: BTreeMap<String, f64>,
+}
+
+impl Check {
+    pub const MOTION: &str = "motion";
+    pub const FIT: &str = "fit";
+    pub const CALM: &str = "calm";
+}
+
 /// Where the numbers come from.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Source {
@@ -100,6 +123,31 @@ pub struct Source {
     pub note: Option<String>,
     /// By axis, where `inflate` measured it; empty: as identified.
     pub inflation: Vec<Inflated>,
+    /// What `identify` found wrong; empty: nothing.
+    pub checks: Vec<Check>,
+}
+
+impl Source {
+    /// The log, or the fit to it, has failed a check: one line that names each with its axes, and the part that is at rest.
+    pub fn failed(&self) -> Option<String> {
+        let of = |kind: &str, words: &str| {
+            let found = self.checks.iter().filter(|check| check.kind == kind);
+            let mut axes: Vec<&str> = found.clone().filter_map(|check| check.axis.as_deref()).collect();
+            axes.dedup();
+            let on = if axes.is_empty() { String::new() } else { format!(" ({})", axes.join(", ")) };
+            found.take(1).map(|_| format!("{words}{on}")).next()
+        };
+        let failed: Vec<String> = [
+            of(Check::MOTION, "the log is not at rest all the time"),
+            of(Check::FIT, "the model misses the spectrum of the log"),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        let calm = self.checks.iter().find(|check| check.kind == Check::CALM);
+        let calm = calm.map_or_else(String::new, |check| format!("; {}", check.message));
+        (!failed.is_empty()).then(|| format!("{}{calm}", failed.join("; ")))
+    }
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -244,6 +292,10 @@ impl Params {
             Ok(text) => Params::from_json(&text, &shown),
             Err(e) => Err(ParamsError::Read { path: shown, reason: e.to_string() }),
         }
+    }
+    /// See [`Source::failed`].
+    pub fn failed_check(&self) -> Option<String> {
+        self.source.as_ref().and_then(Source::failed)
     }
     /// Pretty JSON with a trailing newline; reading it back gives the same document.
     pub fn to_json(&self) -> String {

@@ -92,6 +92,13 @@ impl<'a> Place<'a> {
     pub fn one_or_many(&self) -> Result<Vec<Place<'a>>, KeyError> {
         if self.value.is_array() { self.list() } else { Ok(vec![self.clone()]) }
     }
+    /// The entries of an object with any keys.
+    pub fn entries(&self) -> Result<Vec<(&'a str, Place<'a>)>, KeyError> {
+        let Value::Object(map) = self.value else {
+            return Err(self.error(format!("expected an object, found {}", describe(self.value))));
+        };
+        Ok(map.iter().map(|(name, value)| (&name[..], Place { key: format!("{}.{name}", self.key), value })).collect())
+    }
     pub fn text(&self) -> Result<&'a str, KeyError> {
         self.value.as_str().ok_or_else(|| self.error(format!("expected a text, found {}", describe(self.value))))
     }

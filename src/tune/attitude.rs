@@ -100,16 +100,18 @@ pub fn tune_attitude(params: &Params, design: &Design, flicker_horizon_s: f64) -
         outlier: OUTLIER,
     };
     let at_rest = predicted(&model);
+    let mut tuning = json!({
+        "method": "the documented noise terms, discretised exactly, and stated figures of motion and heading; nothing is fitted",
+        "decisions": warnings,
+    });
+    super::record_check(params, &mut tuning);
     let design = AttitudeDesign {
         sample_rate_hz: params.sample_rate_hz,
         axes: axes.each_ref().map(|axis| axis.name.clone()),
         model,
         design: Some(design.clone()),
         noise: axes.to_vec(),
-        tuning: json!({
-            "method": "the documented noise terms, discretised exactly, and stated figures of motion and heading; nothing is fitted",
-            "decisions": warnings,
-        }),
+        tuning,
     };
     Ok(TunedAttitude { design, at_rest, warnings })
 }

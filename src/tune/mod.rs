@@ -145,20 +145,31 @@ pub fn tune(params: &Params, options: &TuneOptions) -> Result<Tuned, TuneError> 
         reports.push(report);
     }
     let decisions: Vec<_> = reports.iter().map(|r| json!({ "axis": r.name, "decisions": r.warnings })).collect();
+    let mut tuning = json!({
+        "method": "exact discretisation of the documented noise terms; nothing is fitted",
+        "objective": "nominal",
+        "criterion": "least mean square error of every state",
+        "axes": decisions,
+    });
+    record_check(params, &mut tuning);
     let design = FilterDesign {
         quantity: params.quantity,
         sample_rate_hz: params.sample_rate_hz,
         plant: chosen.plant.name().to_string(),
         design: Some(chosen).filter(|chosen| *chosen != Design::default()),
         axes,
-        tuning: json!({
-            "method": "exact discretisation of the documented noise terms; nothing is fitted",
-            "objective": "nominal",
-            "criterion": "least mean square error of every state",
-            "axes": decisions,
-        }),
+        tuning,
     };
     Ok(Tuned { design, reports })
+}
+
+/// Key of the record of the tuning: what check the log behind the parameters has failed.
+pub const FAILED_CHECK: &str = "failed_check";
+
+fn record_check(params: &Params, tuning: &mut serde_json::Value) {
+    if let Some(failed) = params.failed_check() {
+        tuning[FAILED_CHECK] = failed.into();
+    }
 }
 
 /// The linear model that [`tune`] builds a filter on, with which such a sensor in its plant can also be simulated; `dt` in s. The plant is

@@ -3,6 +3,7 @@
 mod band_limit;
 mod exact;
 mod gaps;
+mod lines;
 mod recent;
 mod shared;
 mod study;

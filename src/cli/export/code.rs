@@ -9,9 +9,9 @@ use super::super::Status;
 use super::super::files;
 use super::super::output::print_text;
 use super::{Args, TargetFlag};
+use crate::cli::checked;
 use crate::export::atomic::{self, AtomicFile};
 use crate::export::code::{self, Code, Gain, Precision, Source};
-use crate::filter::FilterDesign;
 use crate::input::sha256;
 
 /// Of the code.
@@ -62,7 +62,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let path = &args.params;
     let (folder, name) = place(args)?;
     files::check(&[], &[path])?;
-    let mut design = FilterDesign::read(path)?;
+    let mut design = checked::design(path)?;
     if let Some(axis) = &args.axis {
         let names: Vec<String> = design.axes.iter().map(|a| a.name.clone()).collect();
         design.axes.retain(|a| a.name == *axis);

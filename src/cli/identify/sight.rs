@@ -26,9 +26,13 @@ pub(super) fn page(params: &Params, axes: &[Axis]) -> Result<String, PageError> 
         ("method", source.method.unwrap_or_default()),
         ("version", format!("kfdesign {}", source.version.unwrap_or_default())),
     ];
+    let failed = params.failed_check();
     Page {
         title: format!("Noise parameters from {log}"),
-        subtitle: "What a log of the sensor at rest says about its noise, and what it cannot say".to_string(),
+        subtitle: failed.map_or_else(
+            || "What a log of the sensor at rest says about its noise, and what it cannot say".into(),
+            |failed| format!("A check failed: {failed}"),
+        ),
         badge: None,
         provenance: provenance.into_iter().map(|(label, value)| (label.to_string(), value)).collect(),
         sections: axes.iter().map(|axis| section(axis, params)).collect(),

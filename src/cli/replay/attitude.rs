@@ -5,6 +5,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::{Args, FormFlag, Status};
 use crate::cli::aid_columns::column_and_unit;
+use crate::cli::checked;
 use crate::cli::log_flags::print_check;
 use crate::cli::output::{digits, print_json, print_text, progress, table};
 use crate::export::table::TableWriter;
@@ -72,6 +73,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         bail!("{flag} is made for linear filters, {} is an attitude filter", args.filter.display());
     }
     let design = AttitudeDesign::read(&args.filter)?;
+    checked::say(&args.filter, checked::recorded(&design.tuning));
     let std_dev =
         Measured::positive(args.attitude.reference_sigma.trim(), Quantity::AngularRate.dimension().times_time(2));
     let std_dev = std_dev.map_err(|message| anyhow::anyhow!("--reference-sigma: {message}"))?.si();

@@ -6,6 +6,7 @@ use anyhow::{Context, bail};
 
 use super::logs::{Opened, Reading};
 use crate::cli::Status;
+use crate::cli::checked;
 use crate::cli::output::{digits, print_json, print_text, table};
 use crate::compare::designs::{Contest, RankError, Ranking};
 use crate::filter::FilterDesign;
@@ -68,10 +69,12 @@ fn design(path: &Path, options: &TuneOptions) -> anyhow::Result<(String, FilterD
     let format = place::parse(&text).ok().and_then(|value| value.get("format")?.as_str().map(str::to_string));
     if format.is_some_and(|format| format.starts_with("kfdesign-params/")) {
         let params = Params::from_json(&text, &name)?;
+        checked::say(path, params.failed_check().as_deref());
         let tuned = tune(&params, options).with_context(|| name.clone())?;
         return Ok((name, tuned.design));
     }
     let design = FilterDesign::from_json(&text, &name)?;
+    checked::say(path, checked::recorded(&design.tuning));
     Ok((name, design))
 }
 

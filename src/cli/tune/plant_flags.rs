@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
 
+use crate::cli::checked;
 use crate::params::{
     AidDrift, AidEntry, AttitudeEntry, AxisParams, Design, Measured, MotionEntry, Params, PlantEntry, check_name,
     unknown_plant,
@@ -131,7 +132,7 @@ fn accelerometer(text: &str, choice: Choice) -> anyhow::Result<AxisParams> {
         Some((path, axis)) if !Path::new(text).exists() => (path, Some(axis)),
         _ => (text, None),
     };
-    let params = Params::read(&PathBuf::from(path))?;
+    let params = checked::params(&PathBuf::from(path))?;
     if params.quantity != Quantity::SpecificForce {
         bail!("--accelerometer {path}: is of an {}, expected a specific-force", params.quantity.name());
     }

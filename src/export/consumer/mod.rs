@@ -55,6 +55,8 @@ pub struct Export {
     pub sample_rate_hz: f64,
     /// Factor on every white density and every drift; 1 is none.
     pub inflation: f64,
+    /// What the logs behind the parameters have failed; see [`crate::params::Source::failed`].
+    pub failed: Vec<String>,
     /// Lines about the factors that the white noise of the parameters has in it already.
     pub measured_inflation: Vec<String>,
     pub choice: Choice,

@@ -62,9 +62,12 @@ impl Page {
             (true, false) => "none beyond the measured one below".into(),
             (false, _) => format!("N and K (and sigma) are {} times those below", digits(export.inflation)),
         };
-        head.push(format!(
-            "{drift}identified at rest: a lower bound of what a moving vehicle shows; inflation: {inflation}; details below"
-        ));
+        // a log that moved says nothing of the sensor at rest
+        let origin = match export.failed.is_empty() {
+            true => format!("{drift}identified at rest: a lower bound of what a moving vehicle shows"),
+            false => format!("identified although a check failed: {}", export.failed.join("; ")),
+        };
+        head.push(format!("{origin}; inflation: {inflation}; details below"));
         let mut details = vec![export.choice_words()];
         details.extend(of_sensors(export));
         details.extend(self.details.iter().cloned());

@@ -14,8 +14,14 @@ use crate::numerics::distribution::{NORMAL_90, NORMAL_95, NORMAL_99};
 const ROUGH: [f64; 2] = [0.03, 0.15];
 /// Of what is no drift where a band limit of many coefficients would have to be found anew at every step of a profile.
 const ROUGH_BESIDE_A_FILTER: f64 = 0.5;
+/// Standard deviation of a logarithm from which a parameter is as good as unknown.
+const UNSURE: f64 = 1.0;
 /// Of the search for a limit.
 const STEPS: usize = 32;
+/// A root of twice the fall this far from the level, however near the places that are tried.
+const LEAP: f64 = 0.3;
+/// A logarithm this near an end of its range is at it: the search ends on the bound itself but for rounding.
+const AT_END: f64 = 1e-6;
 
 /// What the log says about one logarithm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,9 +58,12 @@ pub(super) fn precisions(data: &Ordinates, fit: &Fit) -> Vec<Precision> {
 
 /// The same, but for what is no drift from the observed information alone: enough to say what the log tells of its drift.
 pub(super) fn drift_precisions(data: &Ordinates, fit: &Fit) -> Vec<Precision> {
-    let expected = deviations(whittle::expected_information(data, &fit.form, &fit.logs));
-    let observed = deviations(whittle::observed_information(data, fit));
-    let bounds = whittle::bounds(data, &fit.form, &fit.logs);
+    let bounds = whittle::bounds_around(data, &fit.form, &fit.logs);
+    let ended = ended(fit, &bounds);
+    // what is at an end of its range has no curvature there, and is held while others are told
+    let inside: Vec<usize> = (0..fit.logs.len()).filter(|i| !ended[*i]).collect();
+    let expected = deviations_of(&whittle::expected_information(data, &fit.form, &fit.logs), &inside);
+    let observed = deviations_of(&whittle::observed_information(data, fit), &inside);
     let roles = fit.form.roles();
     let limited = fit.form.has(Kind::BandLimit);
     let mut known: Vec<Precision> = (0..fit.logs.len())
@@ -69,8 +78,8 @@ pub(super) fn drift_precisions(data: &Ordinates, fit: &Fit) -> Vec<Precision> {
                 // a shape at its bounds makes the observed one singular
                 sigma = bound;
             }
-            if drift && sigma >= ROUGH[0] {
-                return profiled(data, fit, i, bounds[i], [sigma, bound, ROUGH[0]]);
+            if drift && (sigma >= ROUGH[0] || beside_an_end(fit, &ended, i)) {
+                return profiled(data, fit, i, &bounds, [sigma, bound, ROUGH[0]]);
             }
             let [lower, upper] = [-1.0, 1.0].map(|side| Some(fit.logs[i] + side * NORMAL_95 * sigma));
             Precision { sigma, bound, lower, upper, told: true }
@@ -78,24 +87,25 @@ pub(super) fn drift_precisions(data: &Ordinates, fit: &Fit) -> Vec<Precision> {
         .collect();
     for std_dev in endless(&fit.form, &known) {
         let step = first_step(known[std_dev].sigma, known[std_dev].bound, ROUGH[0]);
-        known[std_dev].lower = profile(data, fit, std_dev, [-step, bounds[std_dev].0], NORMAL_99).ok();
+        known[std_dev].lower = profile(data, fit, std_dev, -step, &bounds, NORMAL_99).ok();
     }
     keep_open(&fit.form, known)
 }
 
 /// All that is known, from what [`drift_precisions`] gave.
 pub(super) fn completed(data: &Ordinates, fit: &Fit, known: &[Precision]) -> Vec<Precision> {
-    let bounds = whittle::bounds(data, &fit.form, &fit.logs);
+    let bounds = whittle::bounds_around(data, &fit.form, &fit.logs);
+    let ended = ended(fit, &bounds);
     let roles = fit.form.roles();
     let rough = if fit.form.has(Kind::BandLimit) { ROUGH_BESIDE_A_FILTER } else { ROUGH[1] };
     let of = |i: usize| {
         let (piece, role) = roles[i];
         let drift = fit.form.pieces()[piece].kind().is_drift();
         let Precision { sigma, bound, .. } = known[i];
-        if drift || role == Role::Shape || sigma < rough {
+        if drift || role == Role::Shape || (sigma < rough && !beside_an_end(fit, &ended, i)) {
             known[i]
         } else {
-            profiled(data, fit, i, bounds[i], [sigma, bound, rough])
+            profiled(data, fit, i, &bounds, [sigma, bound, rough])
         }
     };
     keep_open(&fit.form, (0..known.len()).into_par_iter().map(of).collect())
@@ -106,11 +116,12 @@ fn profiled(
     data: &Ordinates,
     fit: &Fit,
     i: usize,
-    (low, high): (f64, f64),
+    bounds: &[(f64, f64)],
     [sigma, bound, rough]: [f64; 3],
 ) -> Precision {
-    let step = first_step(sigma, bound, rough);
-    let limits = [(-1.0, low), (1.0, high)].map(|(side, end)| profile(data, fit, i, [side * step, end], NORMAL_95));
+    // beside an end also what is known well: a frequency
+    let step = first_step(sigma, bound, if sigma.is_finite() { sigma.min(rough) } else { rough });
+    let limits = [-1.0, 1.0].map(|side| profile(data, fit, i, side * step, bounds, NORMAL_95));
     let told = limits.iter().all(|limit| limit.map_or_else(|root| root >= NORMAL_90, |_| true));
     let [lower, upper] = limits.map(Result::ok);
     Precision { sigma, bound, lower, upper, told }
@@ -149,6 +160,44 @@ pub(super) fn processes(form: &Form, piece: Piece) -> Vec<[usize; 2]> {
     form.roles().into_iter().enumerate().filter(is_time).map(|(i, _)| [i - before, i]).collect()
 }
 
+/// Which logarithms of a fit are at an end of what is searched.
+pub(super) fn ended(fit: &Fit, bounds: &[(f64, f64)]) -> Vec<bool> {
+    let at_end = |(log, (low, high)): (&f64, &(f64, f64))| *log <= low + AT_END || *log >= high - AT_END;
+    fit.logs.iter().zip(bounds).map(at_end).collect()
+}
+
+/// The logarithm is that of a correlation time at the shortest that is searched: a limit of the search, where the low end of a coefficient stands for none of it.
+pub(super) fn shortest(fit: &Fit, bounds: &[(f64, f64)], i: usize) -> bool {
+    fit.form.roles()[i].1 == Role::CorrelationTime && fit.logs[i] <= bounds[i].0 + AT_END
+}
+
+/// At least two processes with a parameter of more than 100 % standard deviation, or at the shortest correlation time that is searched. Not those without an end: a steady tone
+/// has no width to be known.
+pub(super) fn vague(data: &Ordinates, fit: &Fit, known: &[Precision]) -> bool {
+    let bounds = whittle::bounds_around(data, &fit.form, &fit.logs);
+    let roles = fit.form.roles();
+    let unsure = |i: usize| {
+        let sigma = known[i].sigma;
+        roles[i].1 != Role::Shape && ((sigma.is_finite() && sigma > UNSURE) || shortest(fit, &bounds, i))
+    };
+    let process = |piece: usize| (0..roles.len()).any(|i| roles[i].0 == piece && unsure(i));
+    (0..fit.form.pieces().len()).filter(|piece| process(*piece)).count() > 1
+}
+
+/// A logarithm of the piece, this one or another, is at an end: no parabola tells how far the others go with it.
+fn beside_an_end(fit: &Fit, ended: &[bool], i: usize) -> bool {
+    let roles = fit.form.roles();
+    roles.iter().zip(ended).any(|((piece, role), ended)| *ended && *role != Role::Shape && *piece == roles[i].0)
+}
+
+/// Standard deviations of the logarithms `inside`, the others held; infinite for these.
+pub(super) fn deviations_of(information: &DMatrix<f64>, inside: &[usize]) -> Vec<f64> {
+    let part = DMatrix::from_fn(inside.len(), inside.len(), |i, k| information[(inside[i], inside[k])]);
+    let mut all = vec![f64::INFINITY; information.nrows()];
+    inside.iter().zip(deviations(part)).for_each(|(i, sigma)| all[*i] = sigma);
+    all
+}
+
 /// Standard deviations that belong to an information matrix.
 pub(super) fn deviations(information: DMatrix<f64>) -> Vec<f64> {
     let p = information.nrows();
@@ -168,14 +217,20 @@ pub(super) fn covariance(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(DMatrix::from_fn(p, p, |i, k| inverse[(i, k)] / (scale[i] * scale[k])))
 }
 
-/// Where the likelihood, maximised over all other parameters, has fallen by `level`²/2 on the side of the `first` step; `end`: of the search.
+/// Where the likelihood, maximised over all other parameters, has fallen by `level`²/2 on the side of the `first` step; within `bounds`, which hold the fit.
 /// Where it has not fallen so far, the root of twice its fall at the end (0 where it cannot be had).
 ///
 /// The signed root of the fall is nearly straight in the logarithm and is followed by secants; where it levels off, by growing steps.
-fn profile(data: &Ordinates, fit: &Fit, index: usize, [first, end]: [f64; 2], level: f64) -> Result<f64, f64> {
+fn profile(
+    data: &Ordinates,
+    fit: &Fit,
+    index: usize,
+    first: f64,
+    bounds: &[(f64, f64)],
+    level: f64,
+) -> Result<f64, f64> {
     let centre = fit.logs[index];
-    // where a line has moved on to bins that are wider, its own width is beyond what would be searched there
-    let end = if first > 0.0 { end.max(centre) } else { end.min(centre) };
+    let end = if first > 0.0 { bounds[index].1 } else { bounds[index].0 };
     let inside = |v: f64| if first > 0.0 { v.min(end) } else { v.max(end) };
     let mut at = inside(centre + level * first);
     let mut from = fit.logs.clone();
@@ -190,11 +245,15 @@ fn profile(data: &Ordinates, fit: &Fit, index: usize, [first, end]: [f64; 2], le
     for step in 0..STEPS {
         let mut start = from.clone();
         start[index] = at;
-        let held = whittle::climb(data, &fit.form, &start, &free).ok_or(0.0)?;
+        let held = whittle::climb_within(data, &fit.form, &start, &free, bounds).ok_or(0.0)?;
         let root = (2.0 * (fit.log_likelihood - held.log_likelihood)).max(0.0).sqrt();
         from = held.logs;
-        if (root - level).abs() < 0.01 || far.is_some_and(|far| (far - near).abs() < 1e-3) {
+        if (root - level).abs() < 0.01 {
             return Ok(at);
+        }
+        // relative: a frequency is known to parts in 10⁵; where the fall leaps over the level, another maximum was met, and nothing is known
+        if far.is_some_and(|far| (far - near).abs() < 1e-3 * (far - centre).abs()) {
+            return if (root - level).abs() < LEAP { Ok(at) } else { Err(0.0) };
         }
         if root < level {
             near = at;
@@ -237,14 +296,17 @@ mod tests {
         (data, fit)
     }
 
-    /// The search for a limit that would end on the wrong side of the value (a line that has moved to wider bins than those around its start is narrower than what is
-    /// searched there) finds none, instead of one that the value has passed: `tune` refuses such a document.
+    /// The search for a limit that ends where the value is (a line that has moved to wider bins than those around its start is narrower than what is
+    /// searched there) finds none, instead of one that the value has passed, or of no width: `tune` refuses the first, and the second claims to know.
     #[test]
     fn no_limit_is_on_the_wrong_side_of_its_value() {
         let (data, fit) = fitted(1);
         for (index, value) in fit.logs.iter().enumerate() {
-            assert_eq!(profile(&data, &fit, index, [0.1, value - 1.0], NORMAL_95), Err(0.0), "{index}");
-            assert_eq!(profile(&data, &fit, index, [-0.1, value + 1.0], NORMAL_95), Err(0.0), "{index}");
+            for first in [0.1, -0.1] {
+                let mut bounds = whittle::bounds_around(&data, &fit.form, &fit.logs);
+                bounds[index] = (*value, *value);
+                assert_eq!(profile(&data, &fit, index, first, &bounds, NORMAL_95), Err(0.0), "{index}");
+            }
         }
     }
 

@@ -27,7 +27,7 @@ use rayon::prelude::*;
 use super::shape::Role;
 use super::{Candidate, Identified, IdentifyError, ModelChoice, Precision as Known, bias, entry, usable};
 use crate::allan::{self, AllanCurve, Deviation, Pooled, TauGrid, deviation};
-use crate::consistency::spectrum::departure;
+use crate::consistency::spectrum::{Departure, departure};
 use crate::filter::likelihood::{LogLikelihood, Stretch};
 use crate::noise::{Kind, NoiseModel, Term};
 use crate::numerics::distribution::NORMAL_95;
@@ -149,7 +149,7 @@ impl Whole<'_> {
             not_identified.extend(words.no_drift(fit));
         }
         let sums = sums::sums(&data, fit, refined.as_ref().and_then(|refined| refined.information.as_ref()));
-        let fit_p_value = goodness(&data, fit);
+        let Departure { p_value: fit_p_value, distance, .. } = goodness(&data, fit);
         let candidate = |(i, (fit, known)): (usize, &(Fit, Vec<Precision>))| Candidate {
             model: fit.form.label(),
             parameters: fit.form.parameters(),
@@ -196,6 +196,7 @@ impl Whole<'_> {
             not_identified,
             steps: vec![],
             fit_p_value,
+            fit_distance: Some(distance.abs()),
             first_tau_s: None,
             curve,
         })
@@ -258,6 +259,12 @@ fn choose(
 /// All that is known of the parameters of one of the fits.
 fn whole(data: &Ordinates, fits: &mut [(Fit, Vec<Precision>)], chosen: usize) {
     if let Some((fit, known)) = fits.get_mut(chosen) {
+        // once more within the bounds around where its lines have come to
+        let again = fit.form.has(Kind::Oscillation).then(|| whittle::climb_all(data, &fit.form, &fit.logs)).flatten();
+        if let Some(again) = again.filter(|again| again.log_likelihood > fit.log_likelihood + whittle::WELL) {
+            *fit = again;
+            *known = drift_precisions(data, fit);
+        }
         *known = completed(data, fit, known);
     }
 }
@@ -306,7 +313,7 @@ fn refine(
     start: &Fit,
     logs: &[Vec<Stretch<'_>>],
 ) -> (Fitted, Option<Refined>) {
-    let bounds = whittle::bounds(data, &start.form, &start.logs);
+    let bounds = whittle::bounds_around(data, &start.form, &start.logs);
     let exact = Exact::new(data, &start.form, &start.logs, logs).filter(|_| !logs.is_empty());
     let refined = exact.and_then(|exact| exact.refine(&start.logs, &bounds));
     // a steady tone is no oscillation of any width that is searched: there the two likelihoods differ by more than either knows
@@ -340,7 +347,9 @@ fn moved(
 ) -> Vec<Precision> {
     let samples: usize = logs.iter().flatten().map(|part| part.samples.len()).sum();
     let more = samples as f64 * data.dt / data.total_s();
-    let sigmas = refined.information.clone().map(interval::deviations);
+    let ended = interval::ended(before, &whittle::bounds_around(data, &before.form, &before.logs));
+    let inside: Vec<usize> = (0..ended.len()).filter(|i| !ended[*i]).collect();
+    let sigmas = refined.information.as_ref().map(|all| interval::deviations_of(all, &inside));
     let endless = interval::endless(&before.form, known);
     let of = |(i, old): (usize, &Precision)| {
         let (from, to) = (before.logs[i], refined.logs[i]);
@@ -431,6 +440,9 @@ struct Found {
 /// The terms but for drift that is not identified.
 fn known_terms(data: &Ordinates, fit: &Fit, known: &[Precision]) -> Vec<Found> {
     let unknown = unknown(data, fit, known);
+    let bounds = whittle::bounds_around(data, &fit.form, &fit.logs);
+    // the shortest that is searched is no estimate
+    let interval = |i: usize| known[i].interval().filter(|_| !interval::shortest(fit, &bounds, i));
     let mut first = 0;
     let mut found = Vec::new();
     for (piece, own) in fit.form.split(&fit.logs) {
@@ -448,7 +460,7 @@ fn known_terms(data: &Ordinates, fit: &Fit, known: &[Precision]) -> Vec<Found> {
                 found.extend(floor.map(|term| Found { term, intervals: vec![], precision: vec![[f64::INFINITY; 2]] }));
                 found.push(Found {
                     term,
-                    intervals: of.iter().map(|p| p.interval().map(|limits| limits.map(f64::exp))).collect(),
+                    intervals: indices.clone().map(|i| interval(i).map(|limits| limits.map(f64::exp))).collect(),
                     precision: of.iter().map(|p| [p.sigma, p.bound]).collect(),
                 })
             }
@@ -489,17 +501,22 @@ fn known_precision(terms: &[Found]) -> Vec<Known> {
     all
 }
 
-/// Probability that the cumulative spectrum of the log, divided by that of the model, departs from a straight line as it does.
-fn goodness(data: &Ordinates, fit: &Fit) -> f64 {
+/// How the cumulative spectrum of the log, divided by that of the model, departs from a straight line.
+fn goodness(data: &Ordinates, fit: &Fit) -> Departure {
     let of = |(bin, s): (&ordinates::Bin, &f64)| (bin.count, bin.left(fit.slope) / s);
-    departure(&data.bins.iter().zip(&fit.spectrum(data)).map(of).collect::<Vec<_>>()).p_value
+    departure(&data.bins.iter().zip(&fit.spectrum(data)).map(of).collect::<Vec<_>>())
 }
 
-/// The best score among models whose parameters are known; a model that is close in score takes its place when it foretells the last third of the log
+/// The best score among models whose parameters are known, those of several vague processes only where no simpler one is there; a model that is close in score takes its place when it foretells the last third of the log
 /// clearly better.
 fn choice_of(data: &Ordinates, fits: &[(Fit, Vec<Precision>)], held_out: &[Option<f64>]) -> usize {
-    let identified = |i: &usize| told(data, &fits[*i].0, &fits[*i].1);
-    let Some(first) = (0..fits.len()).find(identified) else { return 0 };
+    let told = |i: &usize| told(data, &fits[*i].0, &fits[*i].1);
+    let Some(best) = (0..fits.len()).find(told) else { return 0 };
+    let clear = |i: &usize| told(i) && !interval::vague(data, &fits[*i].0, &fits[*i].1);
+    let simpler = |i: &usize| fits[*i].0.form.parameters() < fits[best].0.form.parameters();
+    let choose_clear = clear(&best) || (0..fits.len()).filter(simpler).any(|i| clear(&i));
+    let identified = |i: &usize| if choose_clear { clear(i) } else { told(i) };
+    let Some(first) = (0..fits.len()).find(identified) else { return best };
     let foretold = |i: usize| held_out.get(i).copied().flatten();
     let Some(known) = foretold(first) else { return first };
     (first..fits.len())

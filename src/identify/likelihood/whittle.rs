@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use slsqp::{Func, StopTols, minimize};
 
 use super::super::shape::Role;
+use super::FAST;
 use super::form::{Form, Piece};
 use super::ordinates::Ordinates;
 use crate::noise::{Kind, Term};
@@ -18,7 +19,8 @@ use crate::noise::{Kind, Term};
 const SHORTEST: f64 = 0.3;
 /// That of a drift; what is shorter is wideband noise: white, and averaged by the sensor.
 const SHORTEST_DRIFT: f64 = 2.0;
-/// Both beside a band limit: a process that forgets sooner is part of the filter.
+/// Beside a band limit a drift that forgets sooner is part of the filter; a line may be as wide as what is no drift elsewhere, [`FAST`]: what is not allowed to be one wide line
+/// becomes several, each as wide as it may be. That a filter's own resonance is no line is a matter of cost.
 pub(super) const WIDE_LINE: f64 = 30.0;
 /// And at most so many lengths of the log; beyond it a Gauss-Markov process is a random walk.
 const LONGEST: f64 = 10.0;
@@ -276,9 +278,8 @@ pub(super) fn log_likelihood(data: &Ordinates, form: &Form, logs: &[f64]) -> f64
 
 /// Bounds of the logarithms; a line stays where the bins are as fine as around its start, and no narrower than they are.
 pub(super) fn bounds(data: &Ordinates, form: &Form, start: &[f64]) -> Vec<(f64, f64)> {
-    // what is wider than a line beside a band limit is part of that
     let limited = form.has(Kind::BandLimit);
-    let least = if limited { [WIDE_LINE; 2] } else { [SHORTEST, SHORTEST_DRIFT] };
+    let least = if limited { [FAST, WIDE_LINE] } else { [SHORTEST, SHORTEST_DRIFT] };
     let [shortest, shortest_drift] = least.map(|samples| (samples * data.dt).ln());
     let of = |(piece, own): (Piece, &[f64])| {
         let touch = touch(data, piece);
@@ -286,6 +287,11 @@ pub(super) fn bounds(data: &Ordinates, form: &Form, start: &[f64]) -> Vec<(f64, 
         match piece {
             Piece::Oscillation => {
                 let (low, high, width) = data.fine_around(own[1].exp());
+                // a wide line needs no fine bins, and its place is not known better than its width
+                let half = 0.5 / (std::f64::consts::PI * own[2].exp());
+                let last = data.bins.last().map_or(high, |bin| bin.frequency_hz);
+                let low = low.min((own[1].exp() - half).max(0.5 * low));
+                let high = high.max((own[1].exp() + half).min(last));
                 let longest = (1.0 / (std::f64::consts::PI * width)).min(data.span_s());
                 vec![coefficient, (low.ln(), high.ln()), (shortest, longest.ln().max(shortest))]
             }
@@ -301,6 +307,13 @@ pub(super) fn bounds(data: &Ordinates, form: &Form, start: &[f64]) -> Vec<(f64, 
         }
     };
     form.split(start).flat_map(of).collect()
+}
+
+/// The same around a place, as wide as to hold it: a line that has moved on to wider bins than those around its start is narrower than what would be searched
+/// there, and a search from it that begins with another correlation time begins lower.
+pub(super) fn bounds_around(data: &Ordinates, form: &Form, logs: &[f64]) -> Vec<(f64, f64)> {
+    let wide = |((low, high), at): ((f64, f64), &f64)| (low.min(*at), high.max(*at));
+    bounds(data, form, logs).into_iter().zip(logs).map(wide).collect()
 }
 
 /// ln of the density of white noise with the power of the log.
@@ -345,7 +358,17 @@ pub(super) fn touching(data: &Ordinates, term: &Term) -> f64 {
 ///
 /// SLSQP (Kraft 1988) on logarithms scaled by their information, restarted until it gains less than 10⁻⁵.
 pub(super) fn climb(data: &Ordinates, form: &Form, start: &[f64], free: &[usize]) -> Option<Fit> {
-    let bounds = bounds(data, form, start);
+    climb_within(data, form, start, free, &bounds(data, form, start))
+}
+
+/// The same within given bounds.
+pub(super) fn climb_within(
+    data: &Ordinates,
+    form: &Form,
+    start: &[f64],
+    free: &[usize],
+    bounds: &[(f64, f64)],
+) -> Option<Fit> {
     let mut at = start.to_vec();
     for i in free {
         at[*i] = at[*i].clamp(bounds[*i].0, bounds[*i].1);
@@ -353,7 +376,7 @@ pub(super) fn climb(data: &Ordinates, form: &Form, start: &[f64], free: &[usize]
     let held = Held::new(data, form, &at, free);
     let scored = form.has(Kind::BandLimit);
     if scored {
-        scoring(data, form, &mut at, &held, free, &bounds);
+        scoring(data, form, &mut at, &held, free, bounds);
     }
     let mut best = objective(data, form, &at, &held, None);
     let rounds = if scored || free.is_empty() { 0 } else { 8 };
@@ -403,7 +426,7 @@ pub(super) fn climb(data: &Ordinates, form: &Form, start: &[f64], free: &[usize]
             break;
         }
     }
-    best.is_finite().then(|| finish(data, form, at, best, free, &bounds))
+    best.is_finite().then(|| finish(data, form, at, best, free, bounds))
 }
 
 /// Steps of Fisher's scoring, damped (Levenberg 1944, Marquardt 1963), until another would gain less than [`SCORED`]: coefficients of a filter go together as no

@@ -6,7 +6,7 @@ use super::super::{LENGTHS_TO_TELL, WIDEST_INTERVAL, coefficient_unit, worth_rec
 use super::CLOSE;
 use super::form::Piece;
 use super::growth::score;
-use super::interval::{Precision, processes};
+use super::interval::{Precision, processes, shortest};
 use super::names::{name_of, unit_of};
 use super::ordinates::Ordinates;
 use super::whittle::{self, Fit};
@@ -40,15 +40,14 @@ impl Words<'_> {
             .collect()
     }
 
-    /// Lines as narrow as the log is long: how long their correlation times are at least.
+    /// Parameters of lines without a limit: of those that are as narrow as the log is long how long their correlation times are at least (their σ has no upper limit for
+    /// that reason), of those that are as wide as is searched that they are.
     pub(super) fn open_lines(&self, fit: &Fit, known: &[Precision]) -> Vec<NotIdentified> {
         let roles = fit.form.roles();
-        let time = |i: &usize| {
-            let (piece, role) = roles[*i];
-            fit.form.pieces()[piece] == Piece::Oscillation && role == Role::CorrelationTime
-        };
-        let open = |i: &usize| known[*i].lower.is_some() && known[*i].upper.is_none();
-        (0..roles.len()).filter(time).filter(open).map(|i| self.not_identified(fit, i, &known[i])).collect()
+        let line = |i: &usize| fit.form.pieces()[roles[*i].0] == Piece::Oscillation;
+        let with_its_time = |i: &usize| roles[*i].1 == Role::Coefficient && known[*i].lower.is_some();
+        let open = |i: &usize| known[*i].open() && !with_its_time(i);
+        (0..roles.len()).filter(line).filter(open).map(|i| self.not_identified(fit, i, &known[i])).collect()
     }
 
     fn not_identified(&self, fit: &Fit, index: usize, known: &Precision) -> NotIdentified {
@@ -58,6 +57,11 @@ impl Words<'_> {
             (Some(low), _) => format!("above {} (95 %); the {span} s log sets no upper limit", value(low)),
             (None, Some(high)) => format!("below {} (95 %); the {span} s log sets no lower limit", value(high)),
             (None, None) => format!("the {span} s log bounds it on no side"),
+        };
+        let bounds = whittle::bounds_around(self.data, &fit.form, &fit.logs);
+        let reason = match shortest(fit, &bounds, index) {
+            true => format!("at the shortest that is searched, {}; {reason}", value(fit.logs[index])),
+            false => reason,
         };
         // widths shrink like T^(−1/2)
         let needed = self.data.total_s() * (2.0 * NORMAL_95 * known.bound / WIDEST_INTERVAL.ln()).powi(2);

@@ -9,7 +9,8 @@
 //!   than 2 robust standard deviations from the median.
 //! - *Quantised*: 99 % of the distances between neighbouring distinct values are multiples (within 5 %) of one step, and the
 //!   step is at least 1 % of the noise.
-//! - *Motion*: standard deviation in windows (64 samples or more) over 3 times its median; or the means of the windows
+//! - *Motion*: standard deviation in windows (64 samples or more), as the mean distance from the mean tells it, over 3 times its median and over what
+//!   correlated noise, whose windows differ as much as their calmer half says, reaches in one of 10⁶ logs; or the means of the windows
 //!   spread (5 % to 95 %) over more than 3 deg/s or 0.5 m/s²; or a mean rate above 25 deg/s.
 
 use std::collections::BTreeMap;
@@ -20,13 +21,18 @@ use super::calm::AxisWindows;
 use super::robust::{Sample, median, median_and_spread, quantile, short};
 use super::stamps::Count;
 use super::windows::{Extent, Windows, surely_quiet};
-use super::{InputKind, Note, Place, Places};
+use super::{InputKind, Note, Place, Places, unlikely};
+use crate::numerics::distribution::chi_square_quantile;
 use crate::numerics::reduce::Moments;
 use crate::units::{LARGEST, Quantity, Unit};
 
 const WINDOW: usize = 1000;
 const SHORTEST_WINDOW: usize = 50;
 const OUTLIER: f64 = 8.0;
+/// A window that moves scatters so many times as much as usual.
+const LOUDER: f64 = 3.0;
+/// Degrees of freedom from which chance never makes it so.
+const MANY: f64 = 25.0;
 
 /// A value at one end of the range, how often, and how often the next one inside.
 #[derive(Clone, Debug)]
@@ -84,6 +90,8 @@ pub(super) struct AxisCheck {
     outliers: Count,
     largest_outlier: f64,
     disturbed: Count,
+    /// Far values in the window that has most of them.
+    most_far: u64,
     rest: Windows,
 }
 
@@ -128,6 +136,7 @@ impl AxisCheck {
             outliers: Count::default(),
             largest_outlier: 0.0,
             disturbed: Count::default(),
+            most_far: 0,
             rest: Windows::new(),
         }
     }
@@ -268,8 +277,10 @@ impl AxisCheck {
         }
         let bound = OUTLIER * spread;
         let far = window.iter().enumerate().filter(|(_, x)| (*x - center).abs() > bound);
-        if far.clone().count() * 100 > window.len() {
+        let count = far.clone().count();
+        if count * 100 > window.len() {
             self.disturbed.add(place(0));
+            self.most_far = self.most_far.max(count as u64);
         } else {
             for (i, x) in far {
                 self.outliers.add(place(i));
@@ -435,11 +446,15 @@ impl AxisCheck {
         // increments and differences of an integral are one period long
         let to_rate = if self.kind == InputKind::Rate { 1.0 } else { rate_hz };
         let show = |x: f64| format!("{} {}", short(self.rate_unit().from_si(x * to_rate)), self.rate_unit());
-        let mut deviations: Vec<f64> = windows.iter().map(|(m, _)| m.variance().sqrt()).collect();
-        let largest = deviations.iter().copied().fold(0.0, f64::max);
-        let usual = median(&mut deviations);
+        let variances = self.rest.variances();
+        let mut sorted = variances.clone();
+        let usual = median(&mut sorted);
+        sorted.sort_unstable_by(f64::total_cmp);
+        let limit = LOUDER * LOUDER * usual.max(0.0);
+        let limit = limit.max(usual * largest_by_chance(quantile(&sorted, 0.25) / usual, windows.len()));
+        let largest = sorted.last().copied().unwrap_or(0.0).sqrt();
         let moving: Vec<&(Moments, Place)> =
-            windows.iter().filter(|(m, _)| usual > 0.0 && m.variance().sqrt() > 3.0 * usual).collect();
+            windows.iter().zip(&variances).filter(|(_, v)| usual > 0.0 && **v > limit).map(|(w, _)| w).collect();
         let mut means: Vec<f64> = windows.iter().map(|(m, _)| m.mean).collect();
         means.sort_unstable_by(f64::total_cmp);
         let spread = quantile(&means, 0.95) - quantile(&means, 0.05);
@@ -455,12 +470,13 @@ impl AxisCheck {
         };
         if let Some((_, first)) = moving.first() {
             let what = format!(
-                "in {} of {} windows of {} s the values scatter over 3 times as much as usual (up to {}, usually {})",
+                "in {} of {} windows of {} s the values scatter over {} times as much as usual (up to {}, usually {})",
                 moving.len(),
                 windows.len(),
                 short(seconds),
+                short((limit / usual).sqrt()),
                 show(largest),
-                show(usual)
+                show(usual.sqrt())
             );
             out.push(finding(moving.len() as u64 * self.rest.size, Some(*first), what));
         } else if spread * to_rate > most_spread {
@@ -468,15 +484,40 @@ impl AxisCheck {
             out.push(finding(self.usable, None, what));
         } else if mean.abs() * to_rate > most_mean {
             out.push(finding(self.usable, None, format!("the mean is {}", show(mean))));
-        } else if let Count { count, first: Some(first) } = self.disturbed {
+        } else if let Count { count, first: Some(first) } = self.disturbed
+            && unlikely(self.most_far as f64, self.usually_far(count))
+        {
             let what = format!("{count} windows of {WINDOW} samples hold more than 1 % of far values");
             out.push(finding(count * WINDOW as u64, Some(first), what));
         }
     }
 
+    /// Far values that a window has on average, but for the `disturbed` windows.
+    fn usually_far(&self, disturbed: u64) -> f64 {
+        let others = self.usable.saturating_sub(disturbed * WINDOW as u64).max(1);
+        (self.outliers.count * WINDOW as u64) as f64 / others as f64
+    }
+
     fn rate_unit(&self) -> Unit {
         if self.kind == InputKind::Rate { self.unit.clone() } else { self.unit.times_time(-2) }
     }
+}
+
+/// The largest of so many windows' variances over their median that correlated normal noise reaches by chance in one of 10⁶ logs; `quartile`: the
+/// lower one over the median. A window has as many degrees of freedom ν as make its quartile what it is (Welch 1938, Satterthwaite 1946); the upper half, in which motion would be, is
+/// not looked at. The variance is a weighted sum of squares, of which the largest weight is at most 1/√ν of all, and it is that which makes the tail: χ²₁/√ν.
+fn largest_by_chance(quartile: f64, windows: usize) -> f64 {
+    let ratio = |dof: f64| chi_square_quantile(0.25, dof) / chi_square_quantile(0.5, dof);
+    // the ratio grows with the degrees of freedom; of the white noise of 64 samples it is 0.89, and one sinusoid that comes and goes has one
+    if quartile.is_nan() || quartile >= ratio(MANY) {
+        return 0.0;
+    }
+    let (mut low, mut high) = (1.0, MANY);
+    for _ in 0..20 {
+        let middle: f64 = (low * high).sqrt();
+        if ratio(middle) < quartile { low = middle } else { high = middle }
+    }
+    chi_square_quantile(1.0 - 1e-6 / windows as f64, 1.0) / low.sqrt() * low / chi_square_quantile(0.5, low)
 }
 
 fn are<'a>(count: u64, one: &'a str, many: &'a str) -> &'a str {

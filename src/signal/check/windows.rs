@@ -13,25 +13,47 @@ const WINDOWS: usize = 4096;
 pub(super) struct Windows {
     pub(super) size: u64,
     pub(super) done: Vec<(Moments, Place)>,
-    open: Moments,
+    /// Of each of them.
+    within: Vec<Within>,
+    open: (Moments, Within),
     start: Option<Place>,
     /// The beginning of a piece, and where.
     piece: Vec<f64>,
     at: Place,
 }
 
+/// What the pieces of a window have about their own means.
+#[derive(Clone, Copy, Debug, Default)]
+struct Within {
+    /// Sum of absolute values.
+    distances: f64,
+    squares: f64,
+}
+
+impl Within {
+    #[inline(always)]
+    fn of(x: &[f64], moments: &Moments) -> Within {
+        Within { distances: by_eight(x, |v| (v - moments.mean).abs()), squares: moments.squares() }
+    }
+    fn merge(&mut self, other: &Within) {
+        self.distances += other.distances;
+        self.squares += other.squares;
+    }
+}
+
 impl Windows {
     pub(super) fn new() -> Self {
         let at = Place { index: 0, time_s: f64::NAN };
         let piece = Vec::with_capacity(PIECE);
-        Windows { size: PIECE as u64, done: Vec::new(), open: Moments::default(), start: None, piece, at }
+        let open = Default::default();
+        Windows { size: PIECE as u64, done: Vec::new(), within: Vec::new(), open, start: None, piece, at }
     }
 
     #[inline(always)]
     pub(super) fn add_all(&mut self, mut x: &[f64], mut places: Places) {
         while !x.is_empty() {
             let taken = if self.piece.is_empty() && x.len() >= PIECE {
-                self.close(Moments::of(&x[..PIECE]), places.at(0));
+                self.close(&x[..PIECE], places.at(0));
                 PIECE
             } else {
                 if self.piece.is_empty() {
@@ -40,8 +62,10 @@ impl Windows {
                 let taken = x.len().min(PIECE - self.piece.len());
                 self.piece.extend_from_slice(&x[..taken]);
                 if self.piece.len() == PIECE {
-                    self.close(Moments::of(&self.piece), self.at);
-                    self.piece.clear();
+                    let mut piece = std::mem::take(&mut self.piece);
+                    self.close(&piece, self.at);
+                    piece.clear();
+                    self.piece = piece;
                 }
                 taken
             };
@@ -50,11 +74,15 @@ impl Windows {
     }
 
     #[inline(never)]
-    fn close(&mut self, piece: Moments, at: Place) {
+    fn close(&mut self, piece: &[f64], at: Place) {
+        let moments = Moments::of(piece);
         let start = *self.start.get_or_insert(at);
-        self.open.merge(&piece);
-        if self.open.count == self.size {
-            self.done.push((std::mem::take(&mut self.open), start));
+        self.open.0.merge(&moments);
+        self.open.1.merge(&Within::of(piece, &moments));
+        if self.open.0.count == self.size {
+            let (moments, within) = std::mem::take(&mut self.open);
+            self.done.push((moments, start));
+            self.within.push(within);
             self.start = None;
             if self.done.len() == WINDOWS {
                 self.size *= 2;
@@ -64,8 +92,25 @@ impl Windows {
                     (moments, pair[0].1)
                 });
                 self.done = merged.collect();
+                let merged = self.within.chunks_exact(2).map(|pair| {
+                    let mut within = pair[0];
+                    within.merge(&pair[1]);
+                    within
+                });
+                self.within = merged.collect();
             }
         }
+    }
+
+    /// The variance of each window as of normal values: π/2 times the square of the mean distance from the means of its pieces, and the variance of those. A few
+    /// values that are far away, which are no motion, weigh by their distance and not by its square.
+    pub(super) fn variances(&self) -> Vec<f64> {
+        let of = |((moments, _), within): (&(Moments, Place), &Within)| {
+            let distance = within.distances / moments.count as f64;
+            let between = (moments.squares() - within.squares).max(0.0) / moments.count as f64;
+            std::f64::consts::FRAC_PI_2 * distance * distance + between
+        };
+        self.done.iter().zip(&self.within).map(of).collect()
     }
 }
 

@@ -7,7 +7,9 @@ use serde::{Serialize, Serializer};
 
 use super::measured::Range;
 use super::place::{KeyError, Object, Place};
-use super::{AxisParams, Design, Inflated, Measured, NotIdentified, Params, Source, TemperatureEffect, TermEntry};
+use super::{
+    AxisParams, BetweenLogs, Design, Inflated, Measured, NotIdentified, Params, Source, TemperatureEffect, TermEntry,
+};
 use crate::noise::Filter;
 use crate::units::{Dimension, Quantity, Unit};
 
@@ -215,6 +217,9 @@ struct SourceDocument {
     /// What the white noise was multiplied with after the bench, by axis.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     inflation: Vec<Inflated>,
+    /// Of several logs: parameters that are not the same in all.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    between_logs: Vec<BetweenLogs>,
 }
 
 fn in_unit(value: f64, unit: &str) -> Option<Measured> {
@@ -299,6 +304,7 @@ impl From<&Source> for SourceDocument {
             version: source.version.clone(),
             note: source.note.clone(),
             inflation: source.inflation.clone(),
+            between_logs: source.between_logs.clone(),
         }
     }
 }
@@ -485,7 +491,17 @@ fn seconds(object: &Object<'_>, key: &str) -> Result<Option<f64>, KeyError> {
 }
 
 fn source(place: &Place<'_>) -> Result<Source, KeyError> {
-    let object = place.object(&["log", "sha256", "samples", "span", "method", "version", "note", "inflation"])?;
+    let object = place.object(&[
+        "log",
+        "sha256",
+        "samples",
+        "span",
+        "method",
+        "version",
+        "note",
+        "inflation",
+        "between_logs",
+    ])?;
     let text = |key: &str| object.optional(key).map(|p| p.text().map(str::to_string)).transpose();
     Ok(Source {
         log: text("log")?,
@@ -499,6 +515,30 @@ fn source(place: &Place<'_>) -> Result<Source, KeyError> {
             Some(list) => list.list()?.iter().map(inflated).collect::<Result<_, _>>()?,
             None => Vec::new(),
         },
+        between_logs: match object.optional("between_logs") {
+            Some(list) => list.list()?.iter().map(between_logs).collect::<Result<_, _>>()?,
+            None => Vec::new(),
+        },
+    })
+}
+
+fn between_logs(place: &Place<'_>) -> Result<BetweenLogs, KeyError> {
+    let object = place.object(&["axis", "parameter", "spread_percent", "interval_percent", "p_value"])?;
+    let not_negative = |place: &Place<'_>| match place.number()? {
+        value if value >= 0.0 => Ok(value),
+        value => Err(place.error(format!("{value}, expected a number that is not negative"))),
+    };
+    let interval = object.required("interval_percent")?;
+    let ends = interval.list()?.iter().map(not_negative).collect::<Result<Vec<_>, _>>()?;
+    let [low, high] = ends[..] else {
+        return Err(interval.error(format!("expected [lower, upper], found {} values", ends.len())));
+    };
+    Ok(BetweenLogs {
+        axis: object.required("axis")?.text()?.to_string(),
+        parameter: object.required("parameter")?.text()?.to_string(),
+        spread_percent: not_negative(&object.required("spread_percent")?)?,
+        interval_percent: [low, high],
+        p_value: not_negative(&object.required("p_value")?)?,
     })
 }
 

@@ -85,6 +85,21 @@ pub struct Inflated {
     pub interval: [f64; 2],
 }
 
+/// A parameter that is not the same in all logs from which the document is: its value and interval are those of the mean over logs.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BetweenLogs {
+    pub axis: String,
+    /// `white.density`.
+    pub parameter: String,
+    /// Standard deviation from one log to the next, %.
+    pub spread_percent: f64,
+    /// Its 95 % interval.
+    pub interval_percent: [f64; 2],
+    /// Of the test that the logs do not differ.
+    pub p_value: f64,
+}
+
 /// Where the numbers come from.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Source {
@@ -98,6 +113,8 @@ pub struct Source {
     pub note: Option<String>,
     /// By axis, where `inflate` measured it; empty: as identified.
     pub inflation: Vec<Inflated>,
+    /// Of several logs: what differs between them.
+    pub between_logs: Vec<BetweenLogs>,
 }
 
 #[derive(Clone, Debug, PartialEq)]

@@ -2,6 +2,7 @@
 
 mod command;
 mod gmwm;
+mod law;
 mod likelihood;
 mod plan;
 mod temperature;

@@ -45,6 +45,20 @@ mod distribution {
         }
     }
 
+    /// SciPy 1.16 `t.ppf`.
+    #[test]
+    fn student_quantiles() {
+        for (p, dof, t) in [
+            (0.975, 1.0, 12.706204736174694),
+            (0.975, 5.0, 2.5705818356363146),
+            (0.975, 2.5, 3.5746548420036817),
+            (0.9, 30.0, 1.3104150253913955),
+        ] {
+            close(student_quantile(p, dof), t, 1e-7, &format!("{p} of {dof}"));
+        }
+        assert!(student_quantile(1.1, 3.0).is_nan() && student_quantile(0.5, 0.0).is_nan());
+    }
+
     #[test]
     fn chi_square_quantiles() {
         // mpmath 1.3: root of the regularised incomplete gamma function

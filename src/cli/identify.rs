@@ -5,6 +5,7 @@ mod sight;
 pub(super) mod tables;
 mod temperature;
 mod windows;
+mod words;
 
 use std::path::{Path, PathBuf};
 
@@ -23,13 +24,13 @@ use crate::allan::wavelet::{self, Level};
 use crate::export::atomic;
 use crate::identify::graphical::Step;
 use crate::identify::{
-    Candidate, Identified, Method, ModelChoice, Precision, Recent, SharedTime, TimeProfile, identify_axis,
+    Between, Candidate, Identified, Method, ModelChoice, Precision, SharedTime, Tails, TimeProfile, identify_axis,
     identify_logs, parse_model, recent, shared_time,
 };
 use crate::input::{InputKind, LogOptions, TemperatureColumn};
 use crate::params::{NotIdentified, Params, Source};
 use crate::replay::axes::RATE_TOLERANCE;
-use crate::signal::{LogCheck, Recording, upsets};
+use crate::signal::{LogCheck, Recording};
 use crate::units::Quantity;
 
 /// Noise parameters from a log at rest, with intervals
@@ -58,7 +59,8 @@ pub struct Args {
     /// [default: whole; files above 4 GiB in windows of 10 000 000 samples]
     #[arg(long, value_name = "DURATION", allow_hyphen_values = true)]
     window: Option<String>,
-    /// Leave outliers out: samples farther from their surroundings than noise goes
+    /// Leave outliers out: samples farther from their surroundings than normal noise goes. Where the rest has tails, those of Student's t, N holds their variance;
+    /// where it has none, N is that of the noise without the outliers. Without this flag N holds the variance of all samples
     #[arg(long)]
     robust: bool,
     /// Temperature column, beside whose regression the parameters are shown: name or 1-based number, with the unit if the header does not say it
@@ -103,8 +105,6 @@ impl MethodArg {
 
 /// Below this p-value the axes have different correlation times.
 const SAME_TIME: f64 = 0.01;
-/// Steps of the level that are listed.
-const MOST_STEPS: usize = 5;
 
 /// What `identify --json` prints.
 #[derive(Debug, Serialize)]
@@ -152,6 +152,11 @@ struct AxisDocument<'a> {
     /// Likelihood only, where the log has a temperature.
     #[serde(skip_serializing_if = "Option::is_none")]
     temperature: Option<temperature::Document<'a>>,
+    /// Excess kurtosis of the whitened log, which the intervals of the coefficients know; with --robust the law of the noise, where it has tails.
+    tails: Tails,
+    /// Of several logs: whether each parameter is the same in all.
+    #[serde(skip_serializing_if = "<[Between]>::is_empty")]
+    between_logs: &'a [Between],
     allan: CurveDocument,
     /// Wavelet moments only.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -258,6 +263,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
             note: None,
             inflation: Vec::new(),
             checks: checks::checks(&log.checks, &axes),
+            between_logs: axes.iter().flat_map(|axis| words::between_logs(&axis.found)).collect(),
         }),
     };
     if let Some(path) = &args.output {
@@ -378,7 +384,7 @@ fn identify(
     }
     // the first of the longest
     let longest = (0..parts.len()).rev().max_by_key(|i| parts[*i].rate.len()).unwrap_or(0);
-    let upsets = upset_words(&parts[longest], dt, args.robust);
+    let upsets = words::upset_words(&parts[longest], dt, args.robust);
     let dropped: usize = if args.robust { parts.iter_mut().map(Stretch::drop_outliers).sum() } else { 0 };
     let (part, method) = (&parts[longest], args.method.method());
     let mut found = if method == Method::Likelihood {
@@ -388,8 +394,14 @@ fn identify(
     } else {
         identify_axis(&part.name, &part.rate, dt, &part.unit, method, choice)?
     };
+    if args.robust {
+        let used = if method == Method::Likelihood { &parts[..] } else { std::slice::from_ref(part) };
+        let rates: Vec<&[f64]> = used.iter().map(|part| &part.rate[..]).collect();
+        let outliers: Vec<&[usize]> = used.iter().map(|part| &part.outliers[..]).collect();
+        found.put_tails_back(&rates, &outliers, dt);
+    }
     let changes = found.fitted.as_ref().and_then(|fitted| recent(&part.rate, dt, fitted));
-    found.warnings.extend(changes.map(|recent| change_words(&recent, part, dt)));
+    found.warnings.extend(changes.map(|recent| words::change_words(&recent, part, dt)));
     let warmth = warmth.zip(found.fitted.as_ref()).map(|(warmth, fitted)| warmth.shown(fitted, &parts, longest, dt));
     found.params.temperature = warmth.as_ref().and_then(temperature::Shown::record);
     if dropped > 0 {
@@ -403,50 +415,6 @@ fn identify(
     let note = part.left_out_note(role);
     let measured = AxisCurve { name: part.name.clone(), unit: part.unit.clone(), note, curve, fit };
     Ok(Axis { measured, left_out: part.left_out, filled: part.filled, found, warmth })
-}
-
-/// That the noise of the log changes, and what can be done about it.
-fn change_words(recent: &Recent, part: &Stretch, dt: f64) -> String {
-    let seconds = |samples: usize| digits(samples as f64 * dt);
-    let of = if part.left_out > 0 { " of the longest stretch" } else { "" };
-    format!(
-        "the noise changes along the log: the last third{of} is told better by the {} s before it than by all {} s before it (ln L +{}); what comes after \
-         the log may be told best from {} s on: see what --start gives there; drift is then known from less. A filter that finds such noise anew as it runs: replay --follow",
-        seconds(recent.part),
-        seconds(recent.before),
-        digits(recent.gain),
-        seconds(recent.start)
-    )
-}
-
-/// What is in the log that no model of noise has.
-fn upset_words(part: &Stretch, dt: f64, robust: bool) -> Vec<String> {
-    let time = |index: usize| digits(index as f64 * dt);
-    let of = if part.left_out > 0 { " of the longest stretch" } else { "" };
-    let mut words = Vec::new();
-    let outliers = upsets::outliers(&part.rate);
-    if let (Some(first), false) = (outliers.first(), robust) {
-        words.push(format!(
-            "outliers: {} of {} samples are farther from their surroundings than noise goes, the first at {} s{of}; --robust leaves them out",
-            outliers.len(),
-            part.rate.len(),
-            time(*first)
-        ));
-    }
-    let mut clean = part.rate.clone();
-    upsets::fill_outliers(&mut clean);
-    let steps = upsets::steps(&clean, MOST_STEPS);
-    if !steps.is_empty() {
-        let each = steps.iter().map(|step| {
-            let size = digits(part.unit.from_si(step.size));
-            format!("{size} {} at {} s ({} sigma)", part.unit.text(), time(step.index), digits(step.sigmas))
-        });
-        words.push(format!(
-            "the level moves at once: {}{of}; no stationary noise does that, and a model takes it for drift: identify the parts between with --start/--end",
-            each.collect::<Vec<_>>().join(", ")
-        ));
-    }
-    words
 }
 
 fn wavelets(axis: &Axis) -> WaveletDocument {
@@ -496,6 +464,8 @@ fn document<'a>(params: &'a Params, axes: &'a [Axis], log: &'a Log, method: Meth
         steps: &a.found.steps,
         warnings: &a.found.warnings,
         temperature: a.warmth.as_ref().map(temperature::Shown::document),
+        tails: a.found.tails,
+        between_logs: &a.found.between,
         allan: axis(a),
         wavelet_variance: (method == Method::Gmwm).then(|| wavelets(a)),
     });
@@ -546,6 +516,10 @@ fn text(axis: &Axis, quantity: Quantity) -> String {
         if let Some(pairs) = warmth.table() {
             out += &format!("{}:\n{}", pairs.caption, table(pairs.header, &pairs.rows));
         }
+    }
+    if !axis.found.between.is_empty() {
+        let each = axis.found.between.iter().map(|own| format!("{} p = {}", own.parameter, digits(own.p_value)));
+        out += &format!("\nWhether the logs are alike: {}\n", each.collect::<Vec<_>>().join(", "));
     }
     if !axis.found.not_identified.is_empty() {
         out += "\nNot identified:\n";

@@ -26,6 +26,8 @@ pub(super) struct Stretch {
     pub(super) left_out: usize,
     /// How many of `rate` are filled in.
     pub(super) filled: usize,
+    /// Which of `rate` stand in the place of outliers.
+    pub(super) outliers: Vec<usize>,
     /// Where the stretch is in the log, or in its pieces laid out with their holes.
     range: Range<usize>,
     /// The whole log: how many samples are missing before, then samples, of which some may not be finite; empty where `rate` is all.
@@ -60,7 +62,7 @@ impl Stretch {
                 count += 1;
             }
         }
-        upsets::fill_outliers(&mut self.rate);
+        self.outliers = upsets::fill_outliers(&mut self.rate);
         // the integral would carry an outlier on
         self.phase = None;
         count
@@ -147,7 +149,7 @@ fn stretch(name: &str, unit: &Unit, values: Cow<'_, [f64]>, recording: &Recordin
     let phase = (kind == InputKind::Angle).then(|| own.to_vec());
     let unit = if kind == InputKind::Rate { unit.clone() } else { unit.times_time(-2) };
     let rate = if kind == InputKind::Rate && left_out == 0 { values.into_owned() } else { of(own) };
-    Stretch { name: name.to_string(), unit, rate, phase, left_out, filled: 0, range, whole }
+    Stretch { name: name.to_string(), unit, rate, phase, left_out, filled: 0, outliers: Vec::new(), range, whole }
 }
 
 /// Increments and angles as rate.
@@ -265,7 +267,8 @@ mod tests {
         let whole = pieces(&rate, &gaps, kind, <[f64]>::to_vec);
         let unit = Unit::parse("rad/s").unwrap();
         let (rate, range) = (Vec::new(), 0..0);
-        let mut own = Stretch { name: "x".into(), unit, rate, phase: None, left_out: 1, filled: 0, range, whole };
+        let (name, outliers) = ("x".into(), Vec::new());
+        let mut own = Stretch { name, unit, rate, phase: None, left_out: 1, filled: 0, outliers, range, whole };
         own.bridge();
         assert_eq!((own.rate.len(), own.filled, own.left_out), (3005, 6, 50));
         let index: Vec<f64> = (0..3050).map(f64::from).collect();

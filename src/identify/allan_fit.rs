@@ -92,6 +92,8 @@ pub(super) fn identify(
         time_profile: None,
         fitted: None,
         sums: super::Sums::default(),
+        tails: crate::identify::Tails::default(),
+        between: vec![],
         not_identified,
         warnings,
         steps: vec![],

@@ -120,6 +120,8 @@ pub(super) fn identify(name: &str, rate: &[f64], dt: f64, display: &Unit) -> Res
         time_profile: None,
         fitted: None,
         sums: super::Sums::default(),
+        tails: crate::identify::Tails::default(),
+        between: vec![],
         not_identified,
         warnings,
         steps,

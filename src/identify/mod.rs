@@ -8,8 +8,10 @@ mod likelihood;
 mod points;
 mod selection;
 mod shape;
+pub mod tails;
 mod weighted_fit;
 
+pub use likelihood::between::Between;
 pub use likelihood::follow::{Followed, Follower};
 pub use likelihood::maximum::maximum;
 pub use likelihood::recent::{Recent, recent};
@@ -26,6 +28,7 @@ use crate::units::{Unit, digits};
 pub use likelihood::shared::{SharedTime, TimeProfile, shared_time};
 pub use likelihood::sums::{Sum, Sums, counts_as_white};
 use points::Distance;
+pub use tails::{Student, Tails};
 
 /// How parameters are taken from a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
@@ -130,6 +133,10 @@ pub struct Identified {
     pub fitted: Option<Fitted>,
     /// Likelihood only: what white noise and drift are as a whole.
     pub sums: Sums,
+    /// What the intervals of the coefficients know of the law of the noise.
+    pub tails: Tails,
+    /// Of several logs: whether they differ.
+    pub between: Vec<Between>,
     /// Likelihood only, with one Gauss-Markov process: to compare the axes.
     pub time_profile: Option<TimeProfile>,
     pub not_identified: Vec<NotIdentified>,
@@ -227,7 +234,7 @@ pub fn identify_axis(
     method: Method,
     choice: &ModelChoice,
 ) -> Result<Identified, IdentifyError> {
-    match method {
+    let found = match method {
         Method::Graphical => graphical::identify(name, rate, dt, display),
         Method::Allan => allan_fit::identify(name, rate, dt, display, choice, Distance::CubeRoots),
         Method::Gmwm => allan_fit::identify(name, rate, dt, display, choice, Distance::Variances),
@@ -235,7 +242,8 @@ pub fn identify_axis(
             let whole = [vec![Stretch { missing: 0, samples: rate }]];
             likelihood::identify(name, &[rate], &whole, dt, display, choice)
         }
-    }
+    };
+    Ok(found?.with_tails(&[rate], dt))
 }
 
 /// The same by maximum likelihood from logs with gaps, or from several logs of one sensor, each with its own bias.
@@ -250,7 +258,9 @@ pub fn identify_logs(
     display: &Unit,
     choice: &ModelChoice,
 ) -> Result<Identified, IdentifyError> {
-    likelihood::identify(name, stretches, logs, dt, display, choice)
+    Ok(likelihood::identify(name, stretches, logs, dt, display, choice)?
+        .with_tails(stretches, dt)
+        .with_spread(stretches))
 }
 
 /// Parses `auto` or `white+gm+…`; white noise is part of every model.

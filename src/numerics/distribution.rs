@@ -4,7 +4,7 @@
 //! Incomplete gamma functions and starting quantiles come from `statrs`; where its rounding grows with the degrees of
 //! freedom (above `LARGE_DOF`) Temme's uniform expansion replaces it. Checked against mpmath to 1e-9 relative in both tails.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
 use statrs::function::gamma::{checked_gamma_lr, checked_gamma_ur};
 
 /// Two-sided 95 % point of the normal distribution.
@@ -123,6 +123,14 @@ pub fn normal_quantile(p: f64) -> f64 {
         return f64::NAN;
     }
     Normal::standard().inverse_cdf(p)
+}
+
+/// t with P(T_dof ≤ t) = p.
+pub fn student_quantile(p: f64, dof: f64) -> f64 {
+    if !(0.0..=1.0).contains(&p) || dof.is_nan() || dof <= 0.0 {
+        return f64::NAN;
+    }
+    StudentsT::new(0.0, 1.0, dof).map_or(f64::NAN, |law| law.inverse_cdf(p))
 }
 
 /// ψ(x), the derivative of ln Γ.

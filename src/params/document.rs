@@ -7,9 +7,8 @@ use serde::{Serialize, Serializer};
 
 use super::measured::Range;
 use super::place::{KeyError, Object, Place};
-use super::{
-    AxisParams, Check, Design, Inflated, Measured, NotIdentified, Params, Source, TemperatureEffect, TermEntry,
-};
+use super::source::{SourceDocument, source};
+use super::{AxisParams, Design, Measured, NotIdentified, Params, TemperatureEffect, TermEntry};
 use crate::noise::Filter;
 use crate::units::{Dimension, Quantity, Unit};
 
@@ -197,35 +196,7 @@ struct NotIdentifiedDocument {
     upper_limit: Option<Measured>,
 }
 
-/// Where the numbers come from.
-#[derive(Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(rename = "Source")]
-struct SourceDocument {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    log: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    sha256: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    samples: Option<u64>,
-    /// Time from the first to the last sample.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    span: Option<Measured>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    method: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    version: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    note: Option<String>,
-    /// What the white noise was multiplied with after the bench, by axis.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    inflation: Vec<Inflated>,
-    /// Checks that the log, or the fit to it, has failed; none: nothing was found.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    checks: Vec<Check>,
-}
-
-fn in_unit(value: f64, unit: &str) -> Option<Measured> {
+pub(super) fn in_unit(value: f64, unit: &str) -> Option<Measured> {
     Unit::parse(unit).ok().map(|unit| Measured { value, unit, interval: None })
 }
 
@@ -293,22 +264,6 @@ impl From<&AxisParams> for AxisDocument {
                     upper_limit: n.upper_limit.clone(),
                 })
                 .collect(),
-        }
-    }
-}
-
-impl From<&Source> for SourceDocument {
-    fn from(source: &Source) -> Self {
-        SourceDocument {
-            log: source.log.clone(),
-            sha256: source.sha256.clone(),
-            samples: source.samples,
-            span: source.span_s.and_then(|s| in_unit(s, "s")),
-            method: source.method.clone(),
-            version: source.version.clone(),
-            note: source.note.clone(),
-            inflation: source.inflation.clone(),
-            checks: source.checks.clone(),
         }
     }
 }
@@ -506,59 +461,7 @@ fn not_identified(place: &Place<'_>, base: Dimension) -> Result<NotIdentified, K
     })
 }
 
-fn seconds(object: &Object<'_>, key: &str) -> Result<Option<f64>, KeyError> {
+pub(super) fn seconds(object: &Object<'_>, key: &str) -> Result<Option<f64>, KeyError> {
     let place = object.optional(key);
     place.map(|p| Ok(Measured::from_place(&p, Dimension::TIME, Range::Positive)?.si())).transpose()
-}
-
-fn source(place: &Place<'_>) -> Result<Source, KeyError> {
-    let object =
-        place.object(&["log", "sha256", "samples", "span", "method", "version", "note", "inflation", "checks"])?;
-    let text = |key: &str| object.optional(key).map(|p| p.text().map(str::to_string)).transpose();
-    Ok(Source {
-        log: text("log")?,
-        sha256: text("sha256")?,
-        samples: object.optional("samples").map(|p| p.count()).transpose()?,
-        span_s: seconds(&object, "span")?,
-        method: text("method")?,
-        version: text("version")?,
-        note: text("note")?,
-        inflation: match object.optional("inflation") {
-            Some(list) => list.list()?.iter().map(inflated).collect::<Result<_, _>>()?,
-            None => Vec::new(),
-        },
-        checks: match object.optional("checks") {
-            Some(list) => list.list()?.iter().map(check).collect::<Result<_, _>>()?,
-            None => Vec::new(),
-        },
-    })
-}
-
-fn check(place: &Place<'_>) -> Result<Check, KeyError> {
-    let object = place.object(&["kind", "axis", "message", "numbers"])?;
-    let numbers = object.optional("numbers").map(|numbers| numbers.entries()).transpose()?.unwrap_or_default();
-    Ok(Check {
-        kind: object.required("kind")?.text()?.to_string(),
-        axis: object.optional("axis").map(|p| p.text().map(str::to_string)).transpose()?,
-        message: object.required("message")?.text()?.to_string(),
-        numbers: numbers.iter().map(|(name, p)| Ok((name.to_string(), p.number()?))).collect::<Result<_, _>>()?,
-    })
-}
-
-fn inflated(place: &Place<'_>) -> Result<Inflated, KeyError> {
-    let object = place.object(&["axis", "factor", "interval"])?;
-    let positive = |place: &Place<'_>| match place.number()? {
-        value if value > 0.0 => Ok(value),
-        value => Err(place.error(format!("{value}, expected a factor above zero"))),
-    };
-    let interval = object.required("interval")?;
-    let ends = interval.list()?.iter().map(positive).collect::<Result<Vec<_>, _>>()?;
-    let [low, high] = ends[..] else {
-        return Err(interval.error(format!("expected [lower, upper], found {} values", ends.len())));
-    };
-    Ok(Inflated {
-        axis: object.required("axis")?.text()?.to_string(),
-        factor: positive(&object.required("factor")?)?,
-        interval: [low, high],
-    })
 }

@@ -8,6 +8,7 @@ mod design;
 mod document;
 mod measured;
 pub mod place;
+mod source;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -110,6 +111,21 @@ impl Check {
     pub const CALM: &str = "calm";
 }
 
+/// A parameter that is not the same in all logs from which the document is: its value and interval are those of the mean over logs.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BetweenLogs {
+    pub axis: String,
+    /// `white.density`.
+    pub parameter: String,
+    /// Standard deviation from one log to the next, %.
+    pub spread_percent: f64,
+    /// Its 95 % interval.
+    pub interval_percent: [f64; 2],
+    /// Of the test that the logs do not differ.
+    pub p_value: f64,
+}
+
 /// Where the numbers come from.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Source {
@@ -125,6 +141,8 @@ pub struct Source {
     pub inflation: Vec<Inflated>,
     /// What `identify` found wrong; empty: nothing.
     pub checks: Vec<Check>,
+    /// Of several logs: what differs between them.
+    pub between_logs: Vec<BetweenLogs>,
 }
 
 impl Source {

@@ -86,6 +86,44 @@ fn of_odd(n: usize, entering: impl Fn(usize) -> f64 + Sync) -> Option<Vec<f64>> 
     Some(out)
 }
 
+/// The way back: x_k = √(2/n) Σ_j c_j cos(π j (k + ½)/n), j = 1 … n − 1, the series without its mean. By one plan for many series of n samples.
+pub struct Inverse {
+    samples: usize,
+    plan: std::sync::Arc<dyn realfft::ComplexToReal<f64>>,
+    /// e^{iπj/2n}/√(2n).
+    turns: Vec<Complex<f64>>,
+}
+
+impl Inverse {
+    pub fn new(samples: usize) -> Inverse {
+        let n = samples.max(1);
+        let scale = (0.5 / n as f64).sqrt();
+        let turn = |j: usize| Complex::from_polar(scale, PI * j as f64 / (2 * n) as f64);
+        Inverse { samples: n, plan: RealFftPlanner::new().plan_fft_inverse(n), turns: (0..=n / 2).map(turn).collect() }
+    }
+
+    /// Of n − 1 coefficients; empty for another number of them.
+    pub fn series(&self, coefficients: &[f64]) -> Vec<f64> {
+        let n = self.samples;
+        let (mut frequency, mut time) = (self.plan.make_input_vec(), self.plan.make_output_vec());
+        if coefficients.len() + 1 != n || n < 2 {
+            return Vec::new();
+        }
+        // V_j = e^{iπj/2n} (c_j − i c_{n−j}), as the transform has it
+        for (j, (bin, turn)) in frequency.iter_mut().zip(&self.turns).enumerate().skip(1) {
+            *bin = turn * Complex::new(coefficients[j - 1], -coefficients[n - j - 1]);
+        }
+        if n.is_multiple_of(2) {
+            frequency[n / 2].im = 0.0;
+        }
+        // fails only on buffers of a wrong length, and these are its own
+        if self.plan.process(&mut frequency, &mut time).is_err() {
+            return Vec::new();
+        }
+        (0..n).map(|k| if k % 2 == 0 { time[k / 2] } else { time[n - 1 - k / 2] }).collect()
+    }
+}
+
 fn by_plan(n: usize, entering: impl Fn(usize) -> f64) -> Vec<f64> {
     let forward = RealFftPlanner::new().plan_fft_forward(n);
     let (mut time, mut frequency) = (forward.make_input_vec(), forward.make_output_vec());
@@ -153,6 +191,19 @@ mod tests {
         let expected: f64 = x.iter().map(|x| (x - level).powi(2)).sum();
         let found: f64 = cosine_transform(&x).iter().map(|c| c * c).sum();
         assert!((found / expected - 1.0).abs() < 1e-12);
+    }
+
+    /// There and back: the series about its mean.
+    #[test]
+    fn inverse_gives_the_series_back() {
+        for n in [2, 3, 8, 9, 31, 100, 16_384] {
+            let x = series(n);
+            let level = x.iter().sum::<f64>() / n as f64;
+            let back = Inverse::new(n).series(&cosine_transform(&x));
+            assert_eq!(back.len(), n);
+            let apart = x.iter().zip(&back).map(|(x, b)| (x - level - b).abs()).fold(0.0, f64::max);
+            assert!(apart < 1e-12 * (1.0 + n as f64 * 0.01), "{n}: {apart}");
+        }
     }
 
     #[test]

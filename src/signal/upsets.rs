@@ -4,7 +4,7 @@ use super::check::robust;
 use crate::numerics::distribution::normal_quantile;
 
 /// Chance of calling anything in a log of normal noise an outlier, and likewise a step.
-const FALSE_ALARM: f64 = 1e-3;
+pub const FALSE_ALARM: f64 = 1e-3;
 /// Samples whose median is the level that an outlier is held against; so many memories of the noise, where it has one.
 const LEVEL: usize = 31;
 /// Levels over which the noise is taken as equal.
@@ -73,14 +73,16 @@ fn outliers_about(x: &[f64], level_samples: usize) -> Vec<usize> {
     found
 }
 
-/// Puts the median of its surroundings in the place of every outlier.
-pub fn fill_outliers(x: &mut [f64]) {
+/// Puts the median of its surroundings in the place of every outlier; which samples these are.
+pub fn fill_outliers(x: &mut [f64]) -> Vec<usize> {
     let level_samples = LEVEL * memory(x);
-    for index in outliers_about(x, level_samples) {
+    let found = outliers_about(x, level_samples);
+    for &index in &found {
         let first = index / level_samples * level_samples;
         let end = (first + level_samples).min(x.len());
         x[index] = median(x[first..end].to_vec());
     }
+    found
 }
 
 /// Steps of the level, largest first, at most `most`: differences of the means of neighbouring blocks, of all lengths from 8 samples to a sixty-fourth of

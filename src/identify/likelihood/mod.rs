@@ -1,9 +1,10 @@
 //! Maximum likelihood on the cosine coefficients of the log: terms chosen, intervals given, the Cramér-Rao bound beside them.
 //!
 //! `ordinates` is the log in bins, `form` what a model consists of, `whittle` the likelihood and its maximum, `growth` the choice of the
-//! terms, `interval` what is known of each parameter, `sums` of several together, `plan` how long a log must be for that, `recent` whether it stays the same along the log, `follow` the wideband part of it anew from the last samples,
+//! terms, `interval` what is known of each parameter, `sums` of several together, `plan` how long a log must be for that, `recent` whether it stays the same along the log, `between` whether several logs do not differ, `follow` the wideband part of it anew from the last samples,
 //! `temperature` what of it follows the temperature, `words` what is said beside the numbers.
 
+pub(super) mod between;
 mod exact;
 pub(super) mod follow;
 mod form;
@@ -187,6 +188,8 @@ impl Whole<'_> {
             time_profile: shared::TimeProfile::new(&data, on_cosines),
             fitted: Some(fitted.clone()),
             sums,
+            tails: crate::identify::Tails::default(),
+            between: vec![],
             samples: refined.as_ref().map_or(used, |refined| refined.samples),
             // of the parameters that are written, not of others
             exact_log_likelihood: refined.filter(|_| all_known).map(|refined| refined.log_likelihood),

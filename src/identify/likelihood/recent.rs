@@ -44,13 +44,14 @@ pub fn recent(rate: &[f64], dt: f64, fitted: &Fitted) -> Option<Recent> {
     let late = Ordinates::new(&rate[before..], dt, Some(lines));
     // that a tone goes on is no matter of noise that changes
     late.tone().is_none().then_some(())?;
-    let told = |step: usize| {
-        let start = before * step / STEPS;
-        let early = Ordinates::new(&rate[start..before], dt, Some(lines));
-        let seen = whittle::climb_all(&early, &fit.form, &fit.logs)?;
-        Some((step, whittle::log_likelihood(&late, &fit.form, &seen.logs)))
+    // one after the other: a transform takes three times the memory of its samples, and has all threads anyway
+    let part = |step: usize| (step, Ordinates::new(&rate[before * step / STEPS..before], dt, Some(lines)));
+    let parts: Vec<(usize, Ordinates)> = (0..=STEPS - SHORTEST).map(part).collect();
+    let told = |(step, early): &(usize, Ordinates)| {
+        let seen = whittle::climb_all(early, &fit.form, &fit.logs)?;
+        Some((*step, whittle::log_likelihood(&late, &fit.form, &seen.logs)))
     };
-    let found: Vec<(usize, f64)> = (0..=STEPS - SHORTEST).into_par_iter().filter_map(told).collect();
+    let found: Vec<(usize, f64)> = parts.par_iter().filter_map(told).collect();
     let (first, others) = found.split_first().filter(|((step, _), _)| *step == 0)?;
     let (step, best) = others.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
     let gain = best - first.1;

@@ -54,7 +54,7 @@ pub(super) fn sums(data: &Ordinates, fit: &Fit, information: Option<&DMatrix<f64
 }
 
 /// Variance per second over times that are short beside the correlation time.
-fn growth(term: &Term) -> f64 {
+pub(super) fn growth(term: &Term) -> f64 {
     match *term {
         Term::GaussMarkov { std_dev, correlation_time } => 2.0 * std_dev * std_dev / correlation_time,
         Term::RateRandomWalk { density } => density * density,

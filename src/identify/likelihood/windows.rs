@@ -4,6 +4,7 @@
 //! ln L = Σ_w Σ_j −½ [ln 2πS(f_j)/dt + c²_wj dt/S(f_j)] needs of each bin only its count and its power over all windows (Whittle 1953; Bartlett
 //! 1948 for the average of periodograms). Each window has its own mean; windows count as independent, and what is slower than a window is not seen.
 
+use super::super::tails::{MOST_SEGMENTS, SEGMENT};
 use super::ordinates::Ordinates;
 use super::{Candidates, FITTED_SHARE, Identified, IdentifyError, ModelChoice, Whole, choose, usable};
 use crate::allan::{Deviation, Pooled, TauGrid, deviation};
@@ -26,6 +27,9 @@ pub struct Windows {
     /// Σ of the means of the windows.
     level: f64,
     curve: Pooled,
+    /// The beginnings of some windows, from one in so many, for the kurtosis.
+    beginnings: Vec<Vec<f64>>,
+    every: usize,
 }
 
 impl Windows {
@@ -42,6 +46,8 @@ impl Windows {
             count: 0,
             level: 0.0,
             curve,
+            beginnings: Vec::new(),
+            every: 1,
         }
     }
 
@@ -66,6 +72,14 @@ impl Windows {
             }
         }
         self.begun += 1;
+        if self.count.is_multiple_of(self.every) {
+            if self.beginnings.len() == MOST_SEGMENTS {
+                let mut number = 0..;
+                self.beginnings.retain(|_| number.next().is_some_and(|i: usize| i.is_multiple_of(2)));
+                self.every *= 2;
+            }
+            self.beginnings.push(rate[..rate.len().min(SEGMENT)].to_vec());
+        }
         self.count += 1;
         self.level += crate::numerics::reduce::mean(rate);
         Ok(())
@@ -83,7 +97,7 @@ impl Windows {
     /// Terms chosen, parameters and intervals as from a log held at once, but for the last step on the exact likelihood. What is held out is the
     /// last third of the groups. Fails without a window.
     pub fn identify(self, choice: &ModelChoice) -> Result<Identified, IdentifyError> {
-        let Windows { name, display, dt, groups, count, level, curve, .. } = self;
+        let Windows { name, display, dt, groups, count, level, curve, beginnings, .. } = self;
         let Some(data) = Ordinates::pooled(&groups) else {
             return Err(IdentifyError { message: format!("{name}: no window of the log is whole") });
         };
@@ -98,6 +112,7 @@ impl Windows {
             choice,
         };
         let found: Candidates = choose(data, choice, &parts, &[]);
-        whole.identified(found, curve.curve())
+        let beginnings: Vec<&[f64]> = beginnings.iter().map(|own| &own[..]).collect();
+        Ok(whole.identified(found, curve.curve())?.with_tails(&beginnings, dt))
     }
 }

@@ -207,44 +207,35 @@ fn table_of_walks() {
         }
         rows.push((name.to_owned(), file));
     }
-    println!(
-        "| sensor | axis | program | K by default | price | least | 60 s: K, price | short: K, price | +1/2 line |"
-    );
+    println!("| sensor | axis | px4 | ardupilot | kalibr | short: EKF2, Kalibr | 60 s: EKF2, Kalibr | +1/2 line |");
     for (name, file) in rows {
         let params = Params::from_json(&bench.read(&file), &file).unwrap();
-        let (quantity, unit) = (params.quantity, params.quantity.si_unit());
         let span = params.source.as_ref().and_then(|s| s.span_s).unwrap_or(10_000.0);
         for axis in &params.axes {
             let dt = 1.0 / params.sample_rate_hz;
             let tau = (0.1 * span).min(1000.0);
-            let deviation = axis.noise().allan_variance((tau / dt).round() as u64, dt).sqrt();
-            for (target, gyro, accelerometer) in WALKS {
-                if !matches!(target, "px4" | "ardupilot" | "kalibr") {
-                    continue;
-                }
-                let field_name = if quantity == Quantity::AngularRate { gyro } else { accelerometer };
-                let cell = |rule: &str| {
-                    let told = bench.run(&format!("export {file} --to {target} --axis {} --walk {rule}", axis.name));
-                    let there = told.stdout.lines().any(|l| l.contains(field_name) && !l.starts_with('#'));
-                    let clamped = if told.stderr.contains("outside its range") { ", clamped" } else { "" };
-                    let step: f64 = match target {
-                        "px4" => 0.01,
-                        "ardupilot" => 0.012,
-                        _ => 1.0,
-                    };
-                    let prices =
-                        if told.stdout.contains("least possible ") { price(&told.stdout) } else { [f64::NAN; 2] };
-                    let k = if there { field(&told.stdout, field_name) * step.sqrt() } else { f64::NAN };
-                    (format!("{k:.2e}{clamped}"), prices)
-                };
-                let ((k, [cost, least]), (minute, [of_minute, _]), (short, [of_short, _])) =
-                    (cell("least"), cell("horizon=60s"), cell("short"));
-                println!(
-                    "| {name} | {} ({unit}) | {target} | {k} | {cost:.3} | {least:.3} | {minute}, {of_minute:.2} | {short}, {of_short:.2} | {:.1e} |",
-                    axis.name,
-                    deviation * (3.0 / tau).sqrt()
-                );
-            }
+            let half = axis.noise().allan_variance((tau / dt).round() as u64, dt).sqrt() * (3.0 / tau).sqrt();
+            let cell = |target: &str, step: f64, rule: &str| {
+                let told = bench.run(&format!("export {file} --to {target} --axis {} --walk {rule}", axis.name));
+                let (_, gyro, accelerometer) = WALKS.into_iter().find(|(name, ..)| *name == target).unwrap();
+                let key = if params.quantity == Quantity::AngularRate { gyro } else { accelerometer };
+                let there = told.stdout.lines().any(|l| l.contains(key) && !l.starts_with('#'));
+                let k = if there { field(&told.stdout, key) * step.sqrt() } else { f64::NAN };
+                let own = format!("# {}: with this walk", axis.name);
+                let line = told.stdout.lines().find_map(|line| line.strip_prefix(own.as_str()));
+                let of = |key: &str| line.map_or(f64::NAN, |line| field(line, key));
+                (k, of(" drift is ").max(of(" at most ")), of("costs less than "))
+            };
+            let programs = [("px4", 0.01), ("ardupilot", 0.012), ("kalibr", 1.0)];
+            let defaults = programs.map(|(target, step)| {
+                let (k, cost, least) = cell(target, step, "least");
+                format!("{k:.1e}, {cost:.3} ({least:.3})")
+            });
+            let others = ["short", "horizon=60s"].map(|rule| {
+                let ((_, px4, _), (k, kalibr, _)) = (cell("px4", 0.01, rule), cell("kalibr", 1.0, rule));
+                format!("{k:.1e}: {px4:.2}, {kalibr:.2}")
+            });
+            println!("| {name} | {} | {} | {} | {half:.1e} |", axis.name, defaults.join(" | "), others.join(" | "));
         }
     }
 }

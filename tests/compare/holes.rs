@@ -65,7 +65,7 @@ fn the_filter_sees_both_sides_of_a_long_hole() {
     let found = compare(&params(&[WHITE]), &seen, 0.01).unwrap();
     let nis = found.axes[0].innovations.as_ref().unwrap().nis.unwrap().mean;
     assert!((nis - 2.2).abs() < 5.0 * 0.0265, "{nis}");
-    assert!(test(&found, "allan_curve").pass && !test(&found, "nis").pass);
+    assert!(test(&found, "allan_curve").pass() && !test(&found, "nis").pass());
     assert_eq!((found.axes[0].samples, found.axes[0].left_out), (12_000, 8000));
 }
 

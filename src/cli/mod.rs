@@ -33,6 +33,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::units::plain;
+
 /// How a command ended when it could do its work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
@@ -128,7 +130,8 @@ fn in_one_line(error: &anyhow::Error) -> String {
             said.push(cause);
         }
     }
-    said.join(": ")
+    // also of what a file is called
+    plain(&said.join(": ")).into_owned()
 }
 
 /// clap's message as one line: what was found and what is expected, without the usage block.

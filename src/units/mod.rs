@@ -5,6 +5,7 @@
 
 mod dimension;
 mod parse;
+mod plain;
 mod symbol;
 
 use std::fmt;
@@ -12,6 +13,7 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use plain::{plain, plain_lines};
 use symbol::Symbol;
 
 /// Exponents of the base dimensions **times two**, so that `1/sqrt(Hz)` is exact.

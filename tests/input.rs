@@ -8,6 +8,8 @@ mod batches;
 mod damage;
 #[path = "input/every_file.rs"]
 mod every_file;
+#[path = "input/hostile.rs"]
+mod hostile;
 #[path = "input/measured.rs"]
 mod measured;
 #[path = "input/memory.rs"]

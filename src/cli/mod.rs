@@ -38,6 +38,7 @@ use clap::{Parser, Subcommand};
 use self::output::{exit_status, print_help, say};
 pub use self::stop::Stop;
 use crate::consistency::Verdict;
+use crate::units::plain;
 
 /// How a command ended when it could do its work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -162,7 +163,8 @@ fn in_one_line(error: &anyhow::Error) -> String {
             said.push(cause);
         }
     }
-    said.join(": ")
+    // also of what a file is called
+    plain(&said.join(": ")).into_owned()
 }
 
 /// clap's message as one line: what was found and what is expected, without the usage block.

@@ -124,6 +124,8 @@ fn write_names(out: &mut impl Write, header: &[String]) -> io::Result<()> {
         if i > 0 {
             out.write_all(b",")?;
         }
+        // a spreadsheet would take it for a formula, and run it
+        let name = if name.starts_with(['=', '+', '-', '@']) { &format!("'{name}") } else { name };
         if name.contains([',', '"', '\n', '\r', ';', '\t']) {
             write!(out, "\"{}\"", name.replace('"', "\"\""))?;
         } else {

@@ -66,7 +66,7 @@ fn axis(place: &Place<'_>, quantity: Quantity, plant: &str, dt: f64) -> Result<A
     ])?;
     let name_place = object.required("name")?;
     let name = name_place.text()?.to_owned();
-    if name.trim().is_empty() || name.chars().any(char::is_control) {
+    if name.trim().is_empty() {
         return Err(name_place.error("the name of an axis must be readable"));
     }
     let model = model(&object, quantity, plant, dt)?;

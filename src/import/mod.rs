@@ -12,7 +12,7 @@ mod yaml;
 use std::path::Path;
 
 use crate::params::{AxisParams, Measured, Params, Source, TermEntry};
-use crate::units::{Quantity, Unit};
+use crate::units::{Quantity, Unit, plain_lines};
 
 /// A file of parameters is no longer than this, bytes; a log may be.
 const LONGEST: u64 = 1 << 20;
@@ -105,6 +105,7 @@ fn text(path: &Path) -> Result<String, Problem> {
         return Err(Problem::whole("longer than any file of parameters; a log is read by identify"));
     }
     String::from_utf8(std::fs::read(path).map_err(cannot)?)
+        .map(|text| plain_lines(&text).into_owned())
         .map_err(|_| Problem::whole(format!("is no text; expected {KNOWN}")))
 }
 

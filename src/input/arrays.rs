@@ -3,10 +3,13 @@
 //! Samples run along the longer side of a matrix. Its columns are named after it: `_x, _y, _z` of three, `_w, _x, _y, _z` of four whose name
 //! says quaternion, `_1, _2, …` of any other number, which then say nothing of a sensor.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
+use super::account::Account;
 use super::names::{Head, is_rate, words};
-use super::number::Split;
+use super::number::{Split, since};
 use super::source::{Source, Topic};
 use super::{BLOCK, InputError, Rows, Table};
 
@@ -37,13 +40,21 @@ pub(super) trait ArrayFile: Send {
     fn arrays(&self) -> &[Array];
     /// Numbers that stand alone: name and value.
     fn scalars(&self) -> &[(String, f64)];
+    /// What cannot be read: names and classes.
+    fn objects(&self) -> &[(String, String)];
     /// Hands every number of an array out, with its row and column, in whatever order it is stored.
     fn load(&mut self, array: usize, put: &mut Put) -> Result<(), InputError>;
 }
 
+type SharedFile = Arc<Mutex<Box<dyn ArrayFile>>>;
+
 pub(super) struct ArraySource {
     path: PathBuf,
-    file: Box<dyn ArrayFile>,
+    account: Account,
+    rate: Option<(String, f64)>,
+    format: &'static str,
+    /// Of all tables.
+    file: SharedFile,
     topics: Vec<Topic>,
     /// Per topic and column: the array, its column, and whether samples run along the stored columns.
     places: Vec<Vec<Place>>,
@@ -57,8 +68,8 @@ struct Place {
 }
 
 impl ArraySource {
-    pub(super) fn new(path: &Path, file: Box<dyn ArrayFile>) -> Result<ArraySource, InputError> {
-        let mut groups: Vec<(String, u64)> = Vec::new();
+    pub(super) fn new(path: &Path, file: Box<dyn ArrayFile>, account: &Account) -> Result<ArraySource, InputError> {
+        let mut groups: BTreeMap<(String, u64), usize> = BTreeMap::new();
         let (mut topics, mut places): (Vec<Topic>, Vec<Vec<Place>>) = (Vec::new(), Vec::new());
         for (i, array) in file.arrays().iter().enumerate() {
             let across = array.columns > array.rows && array.fields.is_empty();
@@ -67,18 +78,24 @@ impl ArraySource {
                 continue;
             }
             let (group, name) = array.path.rsplit_once(['/', '.']).unwrap_or(("", &array.path));
-            let at = groups.iter().position(|(g, n)| g == group && *n == rows).unwrap_or_else(|| {
-                groups.push((group.to_string(), rows));
+            let longest = array.fields.iter().map(String::len).max().unwrap_or(name.len() + 5);
+            let held = account.columns(columns, longest).and_then(|()| account.columns(1, array.path.len()));
+            held.map_err(|excess| InputError { message: format!("{}: {excess}", path.display()) })?;
+            let at = *groups.entry((group.to_string(), rows)).or_insert_with(|| {
                 let mut topic = Topic::new(array.path.clone(), Vec::new());
                 topic.aliases.push(group.to_string());
                 topic.rows = Some(rows);
                 topics.push(topic);
                 places.push(Vec::new());
-                groups.len() - 1
+                topics.len() - 1
             });
             topics[at].aliases.push(array.path.clone());
             topics[at].heads.extend(heads(name, columns, array));
             places[at].extend((0..columns).map(|column| Place { array: i, column, across }));
+        }
+        for (name, class) in file.objects() {
+            topics.push(Topic { kind: class.clone(), object: true, ..Topic::new(name.clone(), Vec::new()) });
+            places.push(Vec::new());
         }
         if topics.is_empty() {
             let names: Vec<&str> = file.arrays().iter().take(40).map(|a| a.path.as_str()).collect();
@@ -86,7 +103,8 @@ impl ArraySource {
             let message = format!("{}: no array of two or more rows of numbers; there is {found}", path.display());
             return Err(InputError { message });
         }
-        Ok(ArraySource { path: path.to_path_buf(), file, topics, places })
+        let (path, account, rate) = (path.to_path_buf(), account.clone(), rate(file.scalars()));
+        Ok(ArraySource { path, account, rate, format: file.format(), file: Arc::new(Mutex::new(file)), topics, places })
     }
 }
 
@@ -100,12 +118,18 @@ fn heads(name: &str, columns: u64, array: &Array) -> Vec<Head> {
         4 if quaternion => ["w", "x", "y", "z"].iter().map(|axis| format!("{name}_{axis}")).collect(),
         _ => (1..=columns).map(|i| format!("{name}_{i}")).collect(),
     };
+    // a unit of the whole array stands behind its name
+    let whole = Head::parse(name);
     let silent = array.fields.is_empty() && columns != 1 && columns != 3 && !(columns == 4 && quaternion);
     axes.iter()
         .map(|name| {
             let mut head = Head::parse(name);
             if let Some(unit) = &array.unit {
                 head.set_unit_below(unit);
+            }
+            if let (None, Some(unit), true) = (&head.unit, &whole.unit, array.fields.is_empty()) {
+                let axis = name.strip_prefix(&whole.full).unwrap_or_default();
+                (head.unit, head.name) = (Some(unit.clone()), format!("{}{axis}", whole.name));
             }
             head.silent = silent;
             head
@@ -115,18 +139,19 @@ fn heads(name: &str, columns: u64, array: &Array) -> Vec<Head> {
 
 impl Source for ArraySource {
     fn format(&self) -> &'static str {
-        self.file.format()
+        self.format
     }
     fn topics(&self) -> &[Topic] {
         &self.topics
     }
-    fn table(mut self: Box<Self>, topic: usize) -> Result<Box<dyn Table + Send>, InputError> {
+    fn table(&mut self, topic: usize) -> Result<Box<dyn Table + Send>, InputError> {
         Ok(Box::new(ArrayTable {
-            path: self.path,
-            rate: rate(self.file.scalars()),
-            file: self.file,
-            topic: self.topics.swap_remove(topic),
-            places: self.places.swap_remove(topic),
+            path: self.path.clone(),
+            account: self.account.clone(),
+            rate: self.rate.clone(),
+            file: self.file.clone(),
+            topic: self.topics[topic].clone(),
+            places: self.places[topic].clone(),
             time: None,
             axes: Vec::new(),
             loaded: None,
@@ -146,7 +171,8 @@ fn rate(scalars: &[(String, f64)]) -> Option<(String, f64)> {
 /// The selected columns of one table, in memory: the arrays of such files are compressed as a whole.
 struct ArrayTable {
     path: PathBuf,
-    file: Box<dyn ArrayFile>,
+    account: Account,
+    file: SharedFile,
     topic: Topic,
     places: Vec<Place>,
     rate: Option<(String, f64)>,
@@ -175,15 +201,16 @@ impl ArrayTable {
         let mut arrays: Vec<usize> = wanted.iter().chain(&time).map(|place| place.array).collect();
         arrays.sort_unstable();
         arrays.dedup();
-        let mut first: Option<(u64, Split)> = None;
-        let mut stamps: Vec<Split> = Vec::new();
+        // since the stamp that is met first, which is that of the first row unless blocks are stored in another order
+        let (mut met, mut earliest): (Option<Split>, Option<(usize, Split)>) = (None, None);
         loaded.values.resize_with(wanted.len(), Vec::new);
         for array in arrays {
             let here: Vec<(usize, Place)> =
                 wanted.iter().copied().enumerate().filter(|(_, place)| place.array == array).collect();
             let stamp = time.filter(|place| place.array == array);
-            let (values, stamps) = (&mut loaded.values, &mut stamps);
-            self.file.load(array, &mut |row, column, number| {
+            let (values, stamps) = (&mut loaded.values, &mut loaded.time);
+            let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+            file.load(array, &mut |row, column, number| {
                 let at = |place: &Place| {
                     let (row, column) = if place.across { (column, row) } else { (row, column) };
                     (column == place.column && row < rows as u64).then_some(row as usize)
@@ -200,18 +227,20 @@ impl ArrayTable {
                 }
                 if let Some(row) = stamp.as_ref().and_then(at) {
                     if stamps.len() <= row {
-                        stamps.resize(row + 1, (0, f64::NAN));
+                        stamps.resize(row + 1, f64::NAN);
                     }
-                    stamps[row] = number;
-                    if number.1.is_finite() && first.is_none_or(|(earliest, _)| (row as u64) < earliest) {
-                        first = Some((row as u64, number));
+                    stamps[row] = since(&mut met, number);
+                    if number.1.is_finite() && earliest.is_none_or(|(first, _)| row < first) {
+                        earliest = Some((row, number));
                     }
                 }
             })?;
         }
-        loaded.origin = first.map_or((0, 0.0), |(_, stamp)| stamp);
-        let origin = loaded.origin;
-        loaded.time = stamps.iter().map(|(whole, part)| (whole - origin.0) as f64 + (part - origin.1)).collect();
+        loaded.origin = earliest.map_or((0, 0.0), |(_, stamp)| stamp);
+        let before = since(&mut met, loaded.origin);
+        if before != 0.0 {
+            loaded.time.iter_mut().for_each(|stamp| *stamp -= before);
+        }
         let short =
             loaded.values.iter().any(|column| column.len() != rows) || (time.is_some() && loaded.time.len() != rows);
         if short {
@@ -249,6 +278,7 @@ impl Table for ArrayTable {
         self.loaded = None;
     }
     fn rewind(&mut self) -> Result<(), InputError> {
+        self.account.renew();
         self.next = 0;
         Ok(())
     }

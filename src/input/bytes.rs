@@ -2,6 +2,7 @@
 
 use std::io::Read;
 
+use crate::units::plain;
 use ruzstd::decoding::{FrameDecoder, StreamingDecoder};
 
 /// The bytes end before what they declare.
@@ -54,6 +55,5 @@ pub(super) fn zstd(frame: &[u8], size: u64) -> Result<impl Read + '_, String> {
 
 /// A name of a binary file: on one line, whatever is in it.
 pub(super) fn printable(bytes: &[u8]) -> String {
-    let text = String::from_utf8_lossy(bytes);
-    text.chars().map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c }).collect()
+    plain(&String::from_utf8_lossy(bytes)).into_owned()
 }

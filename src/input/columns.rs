@@ -11,7 +11,10 @@ use super::{AxisInfo, ExtraColumn, InputError, InputKind, LogOptions};
 pub(super) struct Choice {
     pub(super) time: Option<(usize, Unit)>,
     pub(super) columns: Vec<usize>,
+    /// In physical units: counts of a converter (`1/131 deg/s`) end at this door.
     pub(super) axes: Vec<AxisInfo>,
+    /// As the log has them, with the step of a converter.
+    pub(super) stored: Vec<Unit>,
     pub(super) quantity: Quantity,
     pub(super) temperature: Temperature,
     /// Units of the extra columns, which come after the axes in `columns`.
@@ -60,7 +63,12 @@ impl Table<'_> {
             Some(list) => self.listed(list)?,
             None => self.by_name(options)?,
         };
-        let (axes, quantity) = self.axes(&columns, options)?;
+        let (mut axes, quantity) = self.axes(&columns, options)?;
+        let physical = |axis: &mut AxisInfo| {
+            let unit = axis.unit.times_time(0);
+            std::mem::replace(&mut axis.unit, unit)
+        };
+        let stored = axes.iter_mut().map(physical).collect();
         let time = self.time(options)?;
         if let Some((time, _)) = &time
             && columns.contains(time)
@@ -78,7 +86,7 @@ impl Table<'_> {
             columns.push(column);
             extra.push(self.extra(self.heads[column], wanted)?);
         }
-        Ok(Choice { time, columns, axes, quantity, temperature, extra })
+        Ok(Choice { time, columns, axes, stored, quantity, temperature, extra })
     }
 
     pub(super) fn fail<T>(&self, what: impl std::fmt::Display) -> Result<T, InputError> {

@@ -6,11 +6,13 @@
 
 mod batch;
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
 use super::InputError;
+use super::account::{Account, Excess};
 use super::bytes::Bytes;
 use super::names::Head;
 use super::number::{Kind, Number, Split};
@@ -39,10 +41,11 @@ struct Form {
 }
 
 /// Opens a log and counts what is in it.
-pub(super) fn open(path: &Path) -> Result<RecordSource, InputError> {
+pub(super) fn open(path: &Path, account: &Account) -> Result<RecordSource, InputError> {
     let fail = |what: String| failure(path, &what);
+    let over = |excess: Excess| fail(excess.into());
     let mut scanner = Scanner::open(path).map_err(fail)?;
-    let mut topics: Vec<Topic> = Vec::new();
+    let mut topics = Topics { list: Vec::new(), places: BTreeMap::new(), account };
     let (mut batch, mut rows) = (Batch::default(), Vec::new());
     while let Some(kind) = scanner.next().map_err(fail)? {
         let Some(form) = &scanner.forms[usize::from(kind)] else { continue };
@@ -57,9 +60,9 @@ pub(super) fn open(path: &Path) -> Result<RecordSource, InputError> {
                 let Some(sensor) = sensor.filter(|_| !rows.is_empty()) else { continue };
                 let name = sensor.name();
                 let new = || Topic::new(name.clone(), sensor.heads());
-                let Some(topic) = place(&mut topics, &name, new) else { continue };
-                let columns = topics[topic].heads.len();
-                rows.chunks_exact(columns).for_each(|row| tally(&mut topics[topic], row.first().copied(), 1e-6));
+                let Some(topic) = topics.place(&name, new).map_err(over)? else { continue };
+                let columns = topic.heads.len();
+                rows.chunks_exact(columns).for_each(|row| tally(topic, row.first().copied(), 1e-6));
                 continue;
             }
             None => {}
@@ -71,10 +74,11 @@ pub(super) fn open(path: &Path) -> Result<RecordSource, InputError> {
             let raw = ["GYR", "ACC", "IMU"].iter().any(|sensor| form.name.starts_with(sensor));
             Topic { rank: u8::from(raw), ..Topic::new(name.clone(), heads) }
         };
-        let Some(at) = place(&mut topics, &name, new) else { continue };
+        let Some(topic) = topics.place(&name, new).map_err(over)? else { continue };
         let unit_s = time.head.unit.as_ref().map_or(f64::NAN, |unit| unit.to_si(1.0));
-        tally(&mut topics[at], unit_s.is_finite().then(|| time.decode(&scanner.message)), unit_s);
+        tally(topic, unit_s.is_finite().then(|| time.decode(&scanner.message)), unit_s);
     }
+    let topics = topics.list;
     if topics.is_empty() {
         return Err(fail("no data in it".into()));
     }
@@ -84,18 +88,34 @@ pub(super) fn open(path: &Path) -> Result<RecordSource, InputError> {
         Ok(Box::new(DataflashTopic { scanner, name: names[topic].clone(), batch: Batch::default() })
             as Box<dyn Messages>)
     };
-    let (format, path) = ("ArduPilot DataFlash log", path.to_path_buf());
-    Ok(RecordSource { format, path, topics, messages: Box::new(messages) })
+    let (format, path, account) = ("ArduPilot DataFlash log", path.to_path_buf(), account.clone());
+    Ok(RecordSource { format, path, account, topics, messages: Box::new(messages) })
 }
 
-/// The number of a topic, which is made if it is new; none where there are too many.
-fn place(topics: &mut Vec<Topic>, name: &str, new: impl FnOnce() -> Topic) -> Option<usize> {
-    let found = topics.iter().position(|topic| topic.name == name);
-    if found.is_none() && topics.len() < MOST_TOPICS {
-        topics.push(new());
-        return Some(topics.len() - 1);
+/// Topics by name.
+struct Topics<'a> {
+    list: Vec<Topic>,
+    places: BTreeMap<String, usize>,
+    account: &'a Account,
+}
+
+impl Topics<'_> {
+    /// A topic, which is made if it is new; none where there are too many.
+    fn place(&mut self, name: &str, new: impl FnOnce() -> Topic) -> Result<Option<&mut Topic>, Excess> {
+        let at = match self.places.get(name) {
+            Some(&at) => at,
+            None if self.list.len() == MOST_TOPICS => return Ok(None),
+            None => {
+                let topic = new();
+                self.account.name(name.len())?;
+                topic.heads.iter().try_for_each(|head| self.account.columns(1, head.full.len()))?;
+                self.places.insert(name.into(), self.list.len());
+                self.list.push(topic);
+                self.list.len() - 1
+            }
+        };
+        Ok(self.list.get_mut(at))
     }
-    found
 }
 
 impl Form {

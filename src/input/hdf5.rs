@@ -10,6 +10,7 @@ mod datatype;
 mod filters;
 mod object;
 
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -17,17 +18,13 @@ use std::path::{Path, PathBuf};
 use self::datatype::{Datatype, Element};
 use self::object::{Dataset, Object};
 use super::InputError;
+use super::account::{Account, JUMP, deeper};
 use super::arrays::{Array, ArrayFile, Put};
 use super::bytes::Bytes;
 
 pub(super) const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 
 const MOST_OBJECTS: usize = 10_000;
-const DEEPEST: usize = 16;
-/// Bytes of the file that may be read over and over: its structures are small and lie apart.
-const SPARE: u64 = 64 << 20;
-/// A structure costs so many bytes of that at least.
-const SMALLEST: u64 = 64;
 /// The address that means none.
 const NOWHERE: u64 = u64::MAX;
 
@@ -37,6 +34,7 @@ pub(super) struct Hdf5 {
     arrays: Vec<Array>,
     datasets: Vec<Dataset>,
     scalars: Vec<(String, f64)>,
+    objects: Vec<(String, String)>,
     /// MATLAB stores matrices with the dimensions in reverse.
     matlab: bool,
 }
@@ -51,20 +49,17 @@ struct Store {
     /// Bytes of an address, and of a length.
     offsets: usize,
     lengths: usize,
-    /// Bytes that may still be read: what points back at itself ends here.
-    budget: u64,
+    /// What points back at itself ends here.
+    account: Account,
 }
 
 impl Store {
-    /// At the opening, and for each array: every byte some times.
-    fn afresh(&mut self) {
-        self.budget = SPARE.saturating_add(self.length.saturating_mul(16));
-    }
     fn read(&mut self, at: u64, count: u64) -> Result<Vec<u8>, String> {
-        self.budget = self.budget.checked_sub(count.max(SMALLEST)).ok_or("damaged: its structures have no end")?;
+        self.account.work(count.saturating_add(JUMP))?;
         if at.checked_add(count).is_none_or(|end| end > self.length) {
             return Err(format!("truncated or damaged: {count} bytes at {at} lie beyond its end ({})", self.length));
         }
+        self.account.room(count)?;
         let mut bytes = vec![0; count as usize];
         let read = self.file.seek(SeekFrom::Start(self.base + at)).and_then(|_| self.file.read_exact(&mut bytes));
         read.map_err(|error| format!("cannot read: {error}"))?;
@@ -80,11 +75,11 @@ impl Store {
 }
 
 impl Hdf5 {
-    pub(super) fn open(path: &Path) -> Result<Hdf5, InputError> {
-        Self::read(path).map_err(|what| InputError { message: format!("{}: {what}", path.display()) })
+    pub(super) fn open(path: &Path, account: &Account) -> Result<Hdf5, InputError> {
+        Self::read(path, account).map_err(|what| InputError { message: format!("{}: {what}", path.display()) })
     }
 
-    fn read(path: &Path) -> Result<Hdf5, String> {
+    fn read(path: &Path, account: &Account) -> Result<Hdf5, String> {
         let io = |error: std::io::Error| format!("cannot read: {error}");
         let mut file = File::open(path).map_err(io)?;
         let length = file.metadata().map_err(io)?.len();
@@ -106,8 +101,7 @@ impl Hdf5 {
             return Err(format!("damaged: addresses of {offsets} bytes and lengths of {lengths}"));
         }
         let length = length - base as u64;
-        let mut store = Store { file, base: base as u64, length, offsets, lengths, budget: 0 };
-        store.afresh();
+        let mut store = Store { file, base: base as u64, length, offsets, lengths, account: account.clone() };
         let root = if version <= 1 {
             // reserved, tree sizes, flags; then four addresses and the name of the root
             bytes.take(1 + 4 + 4 + if version == 1 { 4 } else { 0 } + 4 * offsets + offsets)?;
@@ -116,12 +110,20 @@ impl Hdf5 {
             bytes.take(1 + 3 * offsets)?;
             store.address(&mut bytes)?
         };
-        let mut found = Vec::new();
-        let mut scalars = Vec::new();
-        collect(&mut store, root, "", 0, &mut found, &mut scalars)?;
+        let (groups, found, scalars, objects) = (BTreeSet::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut tree = Tree { store: &mut store, groups, found, scalars, objects };
+        tree.collect(root, "", 0)?;
+        let Tree { found, scalars, objects, .. } = tree;
         let matlab = base == 512 && head.starts_with(b"MATLAB");
-        let mut hdf5 =
-            Hdf5 { path: path.to_path_buf(), store, arrays: Vec::new(), datasets: Vec::new(), scalars, matlab };
+        let mut hdf5 = Hdf5 {
+            path: path.to_path_buf(),
+            store,
+            arrays: Vec::new(),
+            datasets: Vec::new(),
+            scalars,
+            objects,
+            matlab,
+        };
         for (name, dataset, unit) in found {
             hdf5.add(name, dataset, unit)?;
         }
@@ -157,41 +159,62 @@ impl Hdf5 {
     }
 }
 
-/// The datasets below an object, with their units; numbers in attributes go to `scalars`.
-fn collect(
-    store: &mut Store,
-    address: u64,
-    path: &str,
-    depth: usize,
-    found: &mut Vec<(String, Dataset, Option<String>)>,
-    scalars: &mut Vec<(String, f64)>,
-) -> Result<(), String> {
-    if depth > DEEPEST || found.len() > MOST_OBJECTS {
-        return Err("more groups or datasets than a log has".into());
-    }
-    let below = |name: &str| if path.is_empty() { name.to_string() } else { format!("{path}/{name}") };
-    let Object { links, dataset, attributes } = Object::read(store, address).map_err(|what| match path {
-        "" => what,
-        _ => format!("{what} (in '{path}')"),
-    })?;
-    let mut unit = None;
-    for (name, value) in attributes {
-        match value {
-            Element::Number(value) => scalars.push((below(&name), value)),
-            Element::Text(text) if ["unit", "units"].contains(&name.to_lowercase().as_str()) => unit = Some(text),
-            Element::Text(_) => {}
+/// What is found from the root down.
+struct Tree<'a> {
+    store: &'a mut Store,
+    /// Groups that were met: each is known by its first name, so that groups that lead to each other have an end.
+    groups: BTreeSet<u64>,
+    /// With their units.
+    found: Vec<(String, Dataset, Option<String>)>,
+    /// Also numbers in attributes.
+    scalars: Vec<(String, f64)>,
+    /// Of MATLAB, with their classes.
+    objects: Vec<(String, String)>,
+}
+
+impl Tree<'_> {
+    fn collect(&mut self, address: u64, path: &str, depth: usize) -> Result<(), String> {
+        let depth = deeper(depth)?;
+        if self.found.len() > MOST_OBJECTS {
+            return Err("more groups or datasets than a log has".into());
         }
-    }
-    if let Some(dataset) = dataset {
-        found.push((path.to_string(), dataset, unit));
-    }
-    for (name, address) in links {
-        // where MATLAB keeps what cells and objects point at
-        if !name.starts_with('#') {
-            collect(store, address, &below(&name), depth + 1, found, scalars)?;
+        let account = self.store.account.clone();
+        let below = |name: &str| {
+            account.name(path.len() + 1 + name.len())?;
+            Ok::<_, String>(if path.is_empty() { name.to_string() } else { format!("{path}/{name}") })
+        };
+        let Object { links, dataset, attributes } = Object::read(self.store, address).map_err(|what| match path {
+            "" => what,
+            _ => format!("{what} (in '{path}')"),
+        })?;
+        let (mut unit, mut class, mut object) = (None, String::new(), false);
+        for (name, value) in attributes {
+            match value {
+                Element::Text(text) if name == "MATLAB_class" => class = text,
+                Element::Number(_) if name == "MATLAB_object_decode" => object = true,
+                Element::Number(value) => self.scalars.push((below(&name)?, value)),
+                Element::Text(text) if ["unit", "units"].contains(&name.to_lowercase().as_str()) => unit = Some(text),
+                Element::Text(_) => {}
+            }
         }
+        if object {
+            account.name(path.len() + class.len())?;
+            self.objects.push((path.to_string(), class));
+        } else if let Some(dataset) = dataset {
+            account.hold(dataset.held() + unit.as_ref().map_or(0, String::len) as u64)?;
+            self.found.push((path.to_string(), dataset, unit));
+        }
+        if !links.is_empty() && !self.groups.insert(address) {
+            return Ok(());
+        }
+        for (name, address) in links {
+            // where MATLAB keeps what cells and objects point at
+            if !name.starts_with('#') {
+                self.collect(address, &below(&name)?, depth)?;
+            }
+        }
+        Ok(())
     }
-    Ok(())
 }
 
 impl ArrayFile for Hdf5 {
@@ -204,8 +227,10 @@ impl ArrayFile for Hdf5 {
     fn scalars(&self) -> &[(String, f64)] {
         &self.scalars
     }
+    fn objects(&self) -> &[(String, String)] {
+        &self.objects
+    }
     fn load(&mut self, array: usize, put: &mut Put) -> Result<(), InputError> {
-        self.store.afresh();
         let (dataset, matlab) = (&self.datasets[array], self.matlab);
         let fields = self.arrays[array].fields.len();
         let loaded = dataset.load(&mut self.store, &mut |first, second, bytes| match fields {

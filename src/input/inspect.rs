@@ -49,10 +49,9 @@ pub struct ColumnInfo {
 /// Looks at every table of a file.
 pub fn inspect(path: &Path) -> Result<Inventory, InputError> {
     let path = &source::resolve(path)?;
-    let opened = source::open(path)?;
+    let mut opened = source::open(path)?;
     let file = opened.format().to_string();
     let topics: Vec<Topic> = opened.topics().to_vec();
-    let mut opened = Some(opened);
     let mut found = Vec::with_capacity(topics.len());
     for (at, topic) in topics.iter().enumerate() {
         let time = time(topic);
@@ -60,16 +59,15 @@ pub fn inspect(path: &Path) -> Result<Inventory, InputError> {
             |head: &Head| ColumnInfo { name: head.full.clone(), unit: head.unit.as_ref().map(|u| u.to_string()) };
         let mut info = TopicInfo {
             name: topic.name.clone(),
-            kind: topic.heads.is_empty().then(|| topic.kind.clone()),
+            kind: (topic.heads.is_empty() && !topic.object).then(|| topic.kind.clone()),
             rows: topic.rows,
             time: time.map(|column| topic.heads[column].full.clone()),
             span_s: topic.span_s.map(|(first, last)| last - first),
             rate_hz: None,
             columns: topic.heads.iter().map(column).collect(),
-            note: None,
+            note: topic.object.then(|| topic.unread_object()),
         };
         if info.span_s.is_none() && !topic.heads.is_empty() {
-            let opened = opened.take().map_or_else(|| source::open(path), Ok)?;
             let mut table = opened.table(at)?;
             info.rate_hz = table.rate().filter(|_| time.is_none()).map(|(_, rate)| rate);
             match pass(table.as_mut(), time) {

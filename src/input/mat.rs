@@ -1,7 +1,7 @@
 //! MATLAB files of level 5 (`save -v6`, `-v7`): numeric arrays, also inside structures.
 //!
 //! Format: MathWorks, "MAT-File Format", chapter 1. Opening inflates no more of a variable than its name and shape; numbers
-//! are read when they are selected, straight into the columns. Cells, text, sparse and complex matrices and objects are passed over.
+//! are read when they are selected, straight into the columns. Cells, text, sparse and complex matrices are passed over, objects named.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
@@ -10,7 +10,9 @@ use std::path::{Path, PathBuf};
 use flate2::bufread::ZlibDecoder;
 
 use super::InputError;
+use super::account::{Account, Excess, LONGEST_NAME, Metered, STEP, deeper};
 use super::arrays::{Array, ArrayFile, Put};
+use super::bytes::printable;
 use super::number::{Kind, Number};
 
 pub(super) const SIGNATURE: &[u8] = b"MATLAB 5.0 MAT-file";
@@ -18,19 +20,18 @@ pub(super) const SIGNATURE: &[u8] = b"MATLAB 5.0 MAT-file";
 const HEADER: u64 = 128;
 const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
-const DEEPEST: usize = 8;
 const MOST_ARRAYS: usize = 10_000;
-/// Names of the fields of a structure are shorter, all together.
-const MOST_NAMES: u32 = 1 << 20;
-/// MATLAB's names have at most 63 letters.
-const LONGEST_NAME: usize = 256;
+/// Names of the fields of a structure, all together: a thousand and more of the longest.
+const MOST_NAMES: u32 = 1 << 16;
 
 pub(super) struct Mat {
     path: PathBuf,
+    account: Account,
     arrays: Vec<Array>,
     /// Per array: its variable, and how many arrays of the variable come before it.
     places: Vec<(Variable, usize)>,
     scalars: Vec<(String, f64)>,
+    objects: Vec<(String, String)>,
     big_endian: bool,
 }
 
@@ -57,9 +58,10 @@ fn bad(what: &str) -> io::Error {
 }
 
 impl Mat {
-    pub(super) fn open(path: &Path) -> Result<Mat, InputError> {
-        let (arrays, places, scalars) = (Vec::new(), Vec::new(), Vec::new());
-        let mut mat = Mat { path: path.to_path_buf(), arrays, places, scalars, big_endian: false };
+    pub(super) fn open(path: &Path, account: &Account) -> Result<Mat, InputError> {
+        let (arrays, places, scalars, objects) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let (path, account) = (path.to_path_buf(), account.clone());
+        let mut mat = Mat { path, account, arrays, places, scalars, objects, big_endian: false };
         match mat.index() {
             Ok(()) => Ok(mat),
             Err(error) => mat.fail(&error),
@@ -68,6 +70,7 @@ impl Mat {
 
     fn fail<T>(&self, error: &io::Error) -> Result<T, InputError> {
         let what = match error.kind() {
+            _ if error.get_ref().is_some_and(|inner| inner.is::<Excess>()) => error.to_string(),
             io::ErrorKind::UnexpectedEof => "truncated: the file ends inside a variable".into(),
             io::ErrorKind::InvalidData | io::ErrorKind::InvalidInput => format!("damaged: {error}"),
             _ => format!("cannot read: {error}"),
@@ -86,34 +89,49 @@ impl Mat {
             b"MI" => true,
             _ => return Err(bad("the header does not say the byte order")),
         };
-        let mut at = HEADER;
+        // what objects are made of is kept in a variable of its own, which is none
+        let mut subsystem: [u8; 8] = header[116..124].try_into().unwrap_or_default();
+        if self.big_endian {
+            subsystem.reverse();
+        }
+        let subsystem = u64::from_le_bytes(subsystem);
+        let (mut at, mut read) = (HEADER, HEADER);
         while at < length {
-            file.seek(SeekFrom::Start(at))?;
+            self.account.work(STEP)?;
+            // what is in the buffer stays there
+            file.seek_relative((at - read) as i64)?;
+            read = at + 8;
             let (kind, size) = (self.word(&mut file)?, self.word(&mut file)?);
             let variable = Variable { start: at + 8, size, compressed: kind == COMPRESSED };
             at += 8 + u64::from(size);
             if at > length {
                 return Err(io::ErrorKind::UnexpectedEof.into());
             }
-            if kind == MATRIX || kind == COMPRESSED {
+            if (kind == MATRIX || kind == COMPRESSED) && variable.start - 8 != subsystem {
                 let (arrays, places, scalars) = (&mut self.arrays, &mut self.places, &mut self.scalars);
                 let mut count = 0;
-                walk(&mut file, variable, self.big_endian, &mut |met| {
+                let account = &self.account;
+                let objects = walk(&mut file, account, variable, self.big_endian, &mut |met| {
                     if met.rows.checked_mul(met.columns) == Some(1) {
                         let mut bytes = [0; 8];
                         met.numbers.read_exact(&mut bytes[..met.number.size()])?;
                         let (whole, part) = met.number.decode(&bytes);
+                        account.name(met.path.len())?;
                         scalars.push((met.path.to_string(), whole as f64 + part));
                     }
                     if arrays.len() == MOST_ARRAYS {
                         return Err(bad("more than 10,000 arrays"));
                     }
+                    account.name(met.path.len())?;
+                    account.hold(2 * size_of::<(Array, Variable)>() as u64)?;
                     let (rows, columns) = (met.rows, met.columns);
                     arrays.push(Array { path: met.path.into(), rows, columns, unit: None, fields: Vec::new() });
                     places.push((variable, count));
                     count += 1;
                     Ok(())
                 })?;
+                self.objects.extend(objects);
+                read = file.stream_position()?;
             }
         }
         Ok(())
@@ -134,9 +152,12 @@ impl ArrayFile for Mat {
     fn scalars(&self) -> &[(String, f64)] {
         &self.scalars
     }
+    fn objects(&self) -> &[(String, String)] {
+        &self.objects
+    }
     fn load(&mut self, array: usize, put: &mut Put) -> Result<(), InputError> {
         let (variable, wanted) = self.places[array];
-        let rows = self.arrays[array].rows;
+        let (rows, account) = (self.arrays[array].rows, &self.account);
         let mut count = 0;
         let mut visit = |met: Met| {
             count += 1;
@@ -148,6 +169,7 @@ impl ArrayFile for Mat {
             let (mut index, all) = (0, met.rows * met.columns);
             while index < all {
                 let numbers = (all - index).min(1 << 12);
+                account.work(numbers * STEP / 8)?;
                 let bytes = &mut buffer[..numbers as usize * size];
                 met.numbers.read_exact(bytes)?;
                 for number in bytes.chunks_exact(size) {
@@ -157,8 +179,11 @@ impl ArrayFile for Mat {
             }
             Ok(())
         };
-        let read = File::open(&self.path)
-            .and_then(|file| walk(&mut BufReader::new(file), variable, self.big_endian, &mut visit));
+        let read = File::open(&self.path).and_then(|file| {
+            let mut file = BufReader::new(file);
+            file.seek(SeekFrom::Start(variable.start))?;
+            walk(&mut file, account, variable, self.big_endian, &mut visit).map(drop)
+        });
         read.or_else(|error| self.fail(&error))
     }
 }
@@ -169,29 +194,39 @@ fn word(from: &mut dyn Read, big_endian: bool) -> io::Result<u32> {
     Ok(if big_endian { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) })
 }
 
-/// Visits the arrays of one variable of the file.
-fn walk(file: &mut BufReader<File>, variable: Variable, big_endian: bool, visit: &mut Visit) -> io::Result<()> {
-    file.seek(SeekFrom::Start(variable.start))?;
-    let mut walker = Walker { big_endian, visit };
+/// Visits the arrays of one variable of the file, which stands at its beginning. Returns names and classes of objects.
+fn walk(
+    file: &mut BufReader<File>,
+    account: &Account,
+    variable: Variable,
+    big_endian: bool,
+    visit: &mut Visit,
+) -> io::Result<Vec<(String, String)>> {
+    let mut walker = Walker { big_endian, account, visit, objects: Vec::new() };
     let mut stored = file.take(u64::from(variable.size));
     if !variable.compressed {
-        return walker.matrix(&mut stored, "", 0);
+        walker.matrix(&mut stored, "", 0)?;
+        return Ok(walker.objects);
     }
-    let mut inflated = ZlibDecoder::new(stored);
+    let mut inflated = Metered { inner: ZlibDecoder::new(stored), account: account.clone() };
     match (word(&mut inflated, big_endian)?, word(&mut inflated, big_endian)?) {
-        (MATRIX, size) => walker.matrix(&mut (&mut inflated as &mut dyn Read).take(u64::from(size)), "", 0),
-        _ => Ok(()),
+        (MATRIX, size) => walker.matrix(&mut (&mut inflated as &mut dyn Read).take(u64::from(size)), "", 0)?,
+        _ => {}
     }
+    Ok(walker.objects)
 }
 
 struct Walker<'a> {
     big_endian: bool,
+    account: &'a Account,
     visit: &'a mut Visit<'a>,
+    objects: Vec<(String, String)>,
 }
 
 impl Walker<'_> {
     /// Type and size of the element that follows, and its data if they are in the tag.
     fn tag(&self, from: &mut dyn Read) -> io::Result<(u32, u32, Option<[u8; 4]>)> {
+        self.account.work(STEP)?;
         let first = word(from, self.big_endian)?;
         if first >> 16 == 0 {
             return Ok((first, word(from, self.big_endian)?, None));
@@ -211,7 +246,7 @@ impl Walker<'_> {
             return Ok(data[..size as usize].to_vec());
         }
         if size > MOST_NAMES {
-            return Err(bad("a name or shape of over 1 MiB"));
+            return Err(bad("a name or shape of over 64 KiB"));
         }
         let mut data = Vec::new();
         from.take(u64::from(size)).read_to_end(&mut data)?;
@@ -227,12 +262,23 @@ impl Walker<'_> {
     /// What is inside a matrix element. `outer`: path of the structure it is in, with what it is called there.
     fn matrix(&mut self, from: &mut dyn Read, outer: &str, depth: usize) -> io::Result<()> {
         const STRUCTURE: u8 = 2;
+        const OBJECT: u8 = 17;
         let flags = self.short(from)?;
         let (class, complex) = match flags[..] {
             [class, flags, ..] if !self.big_endian => (class, flags & 8 != 0),
             [_, _, flags, class, ..] => (class, flags & 8 != 0),
             _ => return Err(bad("a matrix without flags")),
         };
+        if class == OBJECT {
+            // without a shape: name, the system of types ("MCOS"), class
+            let parts = [self.short(from)?, self.short(from)?, self.short(from)?].map(|part| printable(&part));
+            let [name, _, class] = parts;
+            let name = if depth == 0 { name } else { outer.to_string() };
+            self.account.name(name.len())?;
+            self.account.name(class.len())?;
+            self.objects.push((name, class));
+            return Ok(());
+        }
         let shape: Vec<u64> = self
             .short(from)?
             .chunks_exact(4)
@@ -241,12 +287,12 @@ impl Walker<'_> {
             .collect();
         let name = self.short(from)?;
         if name.len() > LONGEST_NAME {
-            return Err(bad("a name of over 256 bytes"));
+            return Err(Excess::Name(name.len()).into());
         }
-        let path = if depth == 0 { super::bytes::printable(&name) } else { outer.to_string() };
+        let path = if depth == 0 { printable(&name) } else { outer.to_string() };
         let [rows, columns] = shape[..] else { return Ok(()) };
         match class {
-            STRUCTURE if depth < DEEPEST => self.structure(from, &path, rows.saturating_mul(columns), depth),
+            STRUCTURE => self.structure(from, &path, rows.saturating_mul(columns), deeper(depth)?),
             6..=15 if !complex && rows > 0 && columns > 0 => self.numbers(from, &path, rows, columns),
             _ => Ok(()),
         }
@@ -259,23 +305,23 @@ impl Walker<'_> {
             [a, b, c, d] => u32::from_le_bytes([a, b, c, d]),
             _ => return Err(bad("a structure without field names")),
         };
-        if length as usize > LONGEST_NAME {
-            return Err(bad("a name of over 256 bytes"));
-        }
         let names = self.short(from)?;
-        let names: Vec<String> = names.chunks(length.max(1) as usize).map(super::bytes::Bytes::text).collect();
         for element in 1..=count.min(MOST_ARRAYS as u64) {
-            for name in &names {
-                let inner = if count == 1 { format!("{path}.{name}") } else { format!("{path}({element}).{name}") };
-                let (kind, size, inside) = self.tag(from)?;
-                if inside.is_some() {
+            for name in names.chunks(length.max(1) as usize) {
+                let (kind, size, in_tag) = self.tag(from)?;
+                if in_tag.is_some() {
                     continue;
                 }
-                let mut element = from.take(u64::from(size));
+                let mut inside = from.take(u64::from(size));
                 if kind == MATRIX && size > 0 {
-                    self.matrix(&mut element, &inner, depth + 1)?;
+                    let name = super::bytes::Bytes::text(name);
+                    let inner = if count == 1 { format!("{path}.{name}") } else { format!("{path}({element}).{name}") };
+                    if inner.len() > LONGEST_NAME {
+                        return Err(Excess::Name(inner.len()).into());
+                    }
+                    self.matrix(&mut inside, &inner, depth)?;
                 }
-                if io::copy(&mut element, &mut io::sink())? == 0 && element.limit() > 0 {
+                if io::copy(&mut inside, &mut io::sink())? == 0 && inside.limit() > 0 {
                     return Err(io::ErrorKind::UnexpectedEof.into());
                 }
             }

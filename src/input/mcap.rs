@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use super::account::{Account, Excess, Fault, LONGEST_NAME, STEP};
 use super::bytes::{Bytes, Short, printable};
-use super::ros::{Bag, Blocks, Channel, Encoding, decompress};
+use super::ros::{Bag, Blocks, Channel, Encoding, decompress, keep};
 
 pub(super) const SIGNATURE: &[u8] = b"\x89MCAP0\r\n";
 
@@ -27,19 +28,29 @@ pub(super) struct Mcap {
     start: usize,
 }
 
-fn text(bytes: &mut Bytes) -> Result<String, Short> {
+fn text(bytes: &mut Bytes) -> Result<String, Fault> {
     let size = bytes.u32()? as usize;
-    Ok(printable(bytes.take(size)?))
+    let name = bytes.take(size)?;
+    if size > LONGEST_NAME {
+        return Err(Excess::Name(size).into());
+    }
+    Ok(printable(name))
 }
 
 impl Mcap {
     /// What a record says; channel and time of a message.
-    fn take(&mut self, code: u8) -> Result<Option<(u32, u64)>, Short> {
+    fn take(&mut self, code: u8) -> Result<Option<(u32, u64)>, Fault> {
+        let account = &self.blocks.account;
+        account.work(STEP)?;
         let mut bytes = Bytes(&self.record);
         match code {
             SCHEMA => {
                 let number = bytes.u16()?;
-                self.schemas.insert(number, text(&mut bytes)?);
+                let name = text(&mut bytes)?;
+                if self.schemas.get(&number) != Some(&name) {
+                    account.name(name.len())?;
+                    self.schemas.insert(number, name);
+                }
             }
             CHANNEL => {
                 let (number, schema) = (bytes.u16()?, bytes.u16()?);
@@ -50,7 +61,7 @@ impl Mcap {
                     _ => Encoding::Other,
                 };
                 let kind = self.schemas.get(&schema).cloned().unwrap_or_default();
-                self.channels.insert(u32::from(number), Channel { topic, kind, encoding });
+                keep(&mut self.channels, u32::from(number), Channel { topic, kind, encoding }, account)?;
             }
             MESSAGE => {
                 let (channel, _, time, _) = (bytes.u16()?, bytes.u32()?, bytes.number(8)?, bytes.number(8)?);
@@ -62,7 +73,7 @@ impl Mcap {
         Ok(None)
     }
 
-    fn inside(&mut self) -> Result<Option<(u32, u64)>, Short> {
+    fn inside(&mut self) -> Result<Option<(u32, u64)>, Fault> {
         let mut bytes = Bytes(&self.chunk[self.used..]);
         let whole = bytes.0.len();
         let code = bytes.u8()?;
@@ -73,24 +84,25 @@ impl Mcap {
         self.take(code)
     }
 
-    fn open_chunk(&mut self) -> Result<(), String> {
+    /// The inner error: why the chunk is left out.
+    fn open_chunk(&mut self) -> Result<Result<(), String>, Fault> {
         let mut bytes = Bytes(&self.record);
         bytes.take(16)?;
         let size = bytes.number(8)?;
         bytes.take(4)?;
         let compression = text(&mut bytes)?;
         let stored = bytes.number(8)?.min(usize::MAX as u64) as usize;
-        self.chunk = decompress(&compression, bytes.take(stored)?, size)?;
+        let chunk = decompress(&compression, bytes.take(stored)?, size, &self.blocks.account)?;
         self.used = 0;
-        Ok(())
+        Ok(chunk.map(|chunk| self.chunk = chunk))
     }
 }
 
 impl Bag for Mcap {
     const FORMAT: &'static str = "MCAP file";
 
-    fn open(path: &Path) -> Result<Self, String> {
-        let blocks = Blocks::open(path)?;
+    fn open(path: &Path, account: &Account) -> Result<Self, String> {
+        let blocks = Blocks::open(path, account)?;
         let (schemas, channels, chunk, record) = (BTreeMap::new(), BTreeMap::new(), Vec::new(), Vec::new());
         let mut mcap = Mcap { blocks, schemas, channels, chunk, used: 0, record, start: 0 };
         mcap.rewind()?;
@@ -107,10 +119,11 @@ impl Bag for Mcap {
                 match self.inside() {
                     Ok(Some(found)) => return Ok(Some(found)),
                     Ok(None) => {}
-                    Err(Short) => {
+                    Err(Fault::Short) => {
                         self.blocks.damaged(0, "a block ends inside a record");
                         self.used = self.chunk.len();
                     }
+                    Err(Fault::Excess(excess)) => return Err(excess.into()),
                 }
             }
             if self.blocks.ended() {
@@ -127,15 +140,20 @@ impl Bag for Mcap {
             match code {
                 FOOTER => self.blocks.jump(u64::MAX)?,
                 CHUNK => {
-                    if let Err(why) = self.open_chunk() {
-                        self.blocks.damaged(size, &why);
-                        self.chunk.clear();
-                    }
+                    let why = match self.open_chunk() {
+                        Ok(Ok(())) => continue,
+                        Ok(Err(why)) => why,
+                        Err(Fault::Short) => Short.into(),
+                        Err(Fault::Excess(excess)) => return Err(excess.into()),
+                    };
+                    self.blocks.damaged(size, &why);
+                    self.chunk.clear();
                 }
                 _ => match self.take(code) {
                     Ok(Some(found)) => return Ok(Some(found)),
                     Ok(None) => {}
-                    Err(Short) => self.blocks.damaged(size, "a record ends too early"),
+                    Err(Fault::Short) => self.blocks.damaged(size, "a record ends too early"),
+                    Err(Fault::Excess(excess)) => return Err(excess.into()),
                 },
             }
         }

@@ -1,5 +1,6 @@
 //! Log files to [`Recording`] (floor 2): recognise the format, choose columns, units and rate, read in one or two streaming passes.
 
+mod account;
 mod arrays;
 mod bytes;
 mod columns;
@@ -35,7 +36,7 @@ use self::names::Head;
 use self::rows::{Batch, Part, Rows, WORTHWHILE};
 use crate::signal::check::{AxisRange, BackwardStamp, Checker, Finding, Outcome, TimeBase};
 use crate::signal::{Axis, Gap, LogCheck, Recording};
-use crate::units::{Dimension, Quantity, Unit};
+use crate::units::{Dimension, Quantity, Unit, plain};
 
 pub use crate::signal::check::InputKind;
 pub use temperature::TemperatureColumn;
@@ -409,9 +410,7 @@ impl Log {
                 let value = info.unit.from_si(axis.smallest);
                 return self.fail(format!(
                     "column '{}' is constant: {value} {} in all {} usable rows; is it the right column?",
-                    axis.name,
-                    info.unit.times_time(0),
-                    axis.usable
+                    axis.name, info.unit, axis.usable
                 ));
             }
         }
@@ -517,7 +516,7 @@ pub fn read(path: &Path, options: &LogOptions) -> Result<(Recording, LogCheck), 
     scan.check.findings.extend(note);
     let axes = log.choice.axes.into_iter().zip(values).map(axis);
     let recording = Recording {
-        name: path.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned()),
+        name: path.file_name().map_or_else(|| path.display().to_string(), |n| plain(&n.to_string_lossy()).into_owned()),
         quantity: log.choice.quantity,
         sample_rate_hz: scan.check.sample_rate_hz,
         start_s: scan.start_s,

@@ -3,7 +3,7 @@
 //! A name is cut into words (`UncompGyroX` is `uncomp gyro x`). Words say which sensor and which axis a column is; a unit
 //! in brackets (`gyro_x (deg/s)`) or behind the name (`gyr_x_dps`) says its unit.
 
-use crate::units::{Quantity, Unit};
+use crate::units::{Quantity, Unit, plain};
 
 /// One column as the header names it.
 #[derive(Clone, Debug)]
@@ -170,7 +170,7 @@ const NOT_A_SENSOR: [&str; 20] = [
 impl Head {
     /// A cell of the header.
     pub(super) fn parse(cell: &str) -> Head {
-        let full = cell.trim().to_string();
+        let full = plain(cell.trim()).into_owned();
         let text = inside_type(&full).unwrap_or(&full);
         let mut head = Head { full: full.clone(), name: text.to_string(), unit_text: None, unit: None, silent: false };
         if let Some((name, inner)) = bracketed(text) {
@@ -205,7 +205,7 @@ impl Head {
         // C and F are no units by themselves, but a temperature has no others
         let of_temperature = || temperature_unit(unit).filter(|_| is_temperature(&words(&self.name)));
         self.unit = Unit::parse(of_temperature().unwrap_or(unit)).ok();
-        self.unit_text = Some(unit.trim().to_string());
+        self.unit_text = Some(plain(unit.trim()).into_owned());
     }
 }
 

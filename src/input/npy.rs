@@ -10,6 +10,7 @@ use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use self::header::Header;
+use super::account::{Account, JUMP};
 use super::names::Head;
 use super::number::{Number, since};
 use super::{BLOCK, InputError, Rows, Table};
@@ -32,6 +33,7 @@ struct Column {
 
 pub(super) struct NpyTable {
     path: PathBuf,
+    account: Account,
     file: File,
     columns: Vec<Column>,
     named: bool,
@@ -50,23 +52,24 @@ fn fail<T>(path: &Path, what: impl std::fmt::Display) -> Result<T, InputError> {
 }
 
 impl NpyTable {
-    pub(super) fn open(path: &Path) -> Result<NpyTable, InputError> {
+    pub(super) fn open(path: &Path, account: &Account) -> Result<NpyTable, InputError> {
         let io = |error: std::io::Error| InputError { message: format!("{}: cannot read: {error}", path.display()) };
         let mut file = File::open(path).map_err(io)?;
         let length = file.metadata().map_err(io)?.len();
         if length == 0 {
             return fail(path, "the file is empty");
         }
-        let header = match Header::read(&mut file, length) {
+        let header = match Header::read(&mut file, length, account) {
             Ok(header) => header,
             Err(why) => return fail(path, why),
         };
-        let (columns, rows) = match layout(&header, length) {
+        let (columns, rows) = match layout(&header, length, account) {
             Ok(found) => found,
             Err(why) => return fail(path, why),
         };
         Ok(NpyTable {
             path: path.to_path_buf(),
+            account: account.clone(),
             file,
             columns,
             named: header.named,
@@ -119,6 +122,7 @@ impl Table for NpyTable {
         self.axes = axes.iter().copied().chain(beside).collect();
     }
     fn rewind(&mut self) -> Result<(), InputError> {
+        self.account.renew();
         self.next = 0;
         Ok(())
     }
@@ -132,6 +136,10 @@ impl Table for NpyTable {
         if count == 0 {
             return Ok(false);
         }
+        // all columns of a row lie between two values of one
+        let passes = (self.axes.len() + usize::from(self.time.is_some())) as u64;
+        let work = passes.saturating_mul(JUMP + count.saturating_mul(widest));
+        self.account.work(work).or_else(|excess| fail(&self.path, excess))?;
         if let Some(column) = self.time {
             self.fetch(column, count as usize)?;
             let mut origin = self.origin;
@@ -150,7 +158,7 @@ impl Table for NpyTable {
 }
 
 /// Columns and number of rows, or why the array is none that is read.
-fn layout(header: &Header, length: u64) -> Result<(Vec<Column>, u64), String> {
+fn layout(header: &Header, length: u64, account: &Account) -> Result<(Vec<Column>, u64), String> {
     let (rows, per_row) = match (header.shape[..].iter().as_slice(), header.named) {
         ([rows], _) => (*rows, 1),
         ([rows, columns], false) => (*rows, *columns),
@@ -179,6 +187,7 @@ fn layout(header: &Header, length: u64) -> Result<(Vec<Column>, u64), String> {
     if rows == 0 {
         return Err("the array has no rows".into());
     }
+    account.columns(if header.named { 0 } else { per_row }, 12)?;
     let mut columns = Vec::new();
     if header.named {
         for field in &header.fields {

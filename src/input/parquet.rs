@@ -20,6 +20,8 @@ use parquet::schema::types::ColumnDescriptor;
 
 use self::guard::guarded;
 use self::pages::{Disk, Pages};
+use self::thrift::Refusal;
+use super::account::{Account, STEP};
 use super::bytes::printable;
 use super::names::Head;
 use super::number::{Kind, Number, Split, since};
@@ -31,6 +33,7 @@ pub(super) const ENCRYPTED: &[u8] = b"PARE";
 
 pub(super) struct ParquetTable {
     path: PathBuf,
+    account: Account,
     file: Arc<Disk>,
     metadata: ParquetMetaData,
     columns: Vec<Column>,
@@ -72,15 +75,17 @@ struct Group {
 }
 
 impl ParquetTable {
-    pub(super) fn open(path: &Path) -> Result<ParquetTable, InputError> {
+    pub(super) fn open(path: &Path, account: &Account) -> Result<ParquetTable, InputError> {
         let fail = |what: String| Err(InputError { message: format!("{}: {what}", path.display()) });
         let file = match File::open(path) {
             Ok(file) => file,
             Err(error) => return fail(format!("cannot read: {error}")),
         };
         let contents = "truncated or damaged: its table of contents cannot be read";
-        if thrift::contents_end(&file).is_err() {
-            return fail(format!("{contents} (a list declares more than there is)"));
+        match thrift::contents(&file, account) {
+            Ok(()) => {}
+            Err(Refusal::Endless) => return fail(format!("{contents} (a list declares more than there is)")),
+            Err(Refusal::Excess(excess)) => return fail(excess.to_string()),
         }
         let metadata = match guarded(|| ParquetMetaDataReader::new().parse_and_finish(&file)) {
             Some(Ok(metadata)) => metadata,
@@ -99,6 +104,7 @@ impl ParquetTable {
         }
         Ok(ParquetTable {
             path: path.to_path_buf(),
+            account: account.clone(),
             file: Arc::new(Disk(file)),
             metadata,
             columns,
@@ -126,7 +132,7 @@ impl ParquetTable {
             let rows = group.num_rows().max(0) as u64;
             let wanted = self.time.iter().chain(&self.axes).map(|&column| self.columns[column].leaf);
             let readers = wanted.map(|leaf| {
-                let pages = Pages::open(&self.file, group.column(leaf), rows as usize)?;
+                let pages = Pages::open(&self.file, group.column(leaf), rows as usize, &self.account)?;
                 Ok(get_column_reader(group.column(leaf).column_descr_ptr(), Box::new(pages)))
             });
             match readers.collect::<Result<Vec<_>, ParquetError>>() {
@@ -160,6 +166,7 @@ impl Table for ParquetTable {
         self.axes = axes.iter().copied().chain(beside).collect();
     }
     fn rewind(&mut self) -> Result<(), InputError> {
+        self.account.renew();
         (self.group, self.open, self.at) = (0, None, 0);
         Ok(())
     }
@@ -173,6 +180,9 @@ impl Table for ParquetTable {
         }
         let Some(mut group) = self.open.take() else { return Ok(false) };
         let count = group.left.min(BLOCK as u64) as usize;
+        if let Err(excess) = self.account.work((count * group.readers.len()) as u64 * STEP / 8) {
+            return self.fail(&excess.to_string());
+        }
         let mut numbers = Vec::with_capacity(count);
         for (i, reader) in group.readers.iter_mut().enumerate() {
             let column = self.time.iter().chain(&self.axes).nth(i).map(|&column| &self.columns[column]);
@@ -326,5 +336,5 @@ fn plain(error: &ParquetError) -> String {
         ParquetError::General(text) | ParquetError::NYI(text) | ParquetError::EOF(text) => text.clone(),
         other => other.to_string(),
     };
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
+    printable(text.split_whitespace().collect::<Vec<_>>().join(" ").as_bytes())
 }

@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
+use super::account::Account;
 use super::names::Head;
 use super::number::{Number, Split, since};
 use super::source::{Source, Topic};
@@ -101,12 +102,13 @@ pub(super) fn tally(topic: &mut Topic, stamp: Option<Split>, unit_s: f64) {
 }
 
 /// The messages of a topic, by its number.
-pub(super) type OpenTopic = Box<dyn FnOnce(usize) -> Result<Box<dyn Messages>, String> + Send>;
+pub(super) type OpenTopic = Box<dyn Fn(usize) -> Result<Box<dyn Messages>, String> + Send>;
 
 /// A file of messages whose topics are known.
 pub(super) struct RecordSource {
     pub(super) format: &'static str,
     pub(super) path: PathBuf,
+    pub(super) account: Account,
     pub(super) topics: Vec<Topic>,
     pub(super) messages: OpenTopic,
 }
@@ -118,11 +120,12 @@ impl Source for RecordSource {
     fn topics(&self) -> &[Topic] {
         &self.topics
     }
-    fn table(mut self: Box<Self>, topic: usize) -> Result<Box<dyn Table + Send>, InputError> {
+    fn table(&mut self, topic: usize) -> Result<Box<dyn Table + Send>, InputError> {
         let messages = (self.messages)(topic).map_err(|what| failure(&self.path, &what))?;
-        let topic = self.topics.swap_remove(topic);
+        let topic = self.topics[topic].clone();
         Ok(Box::new(RecordTable {
-            path: self.path,
+            path: self.path.clone(),
+            account: self.account.clone(),
             topic,
             messages,
             time: None,
@@ -140,6 +143,7 @@ pub(super) fn failure(path: &Path, what: &str) -> InputError {
 
 struct RecordTable {
     path: PathBuf,
+    account: Account,
     topic: Topic,
     messages: Box<dyn Messages>,
     time: Option<usize>,
@@ -177,6 +181,7 @@ impl Table for RecordTable {
     }
     fn rewind(&mut self) -> Result<(), InputError> {
         self.at = 0;
+        self.account.renew();
         self.messages.rewind().map_err(|what| failure(&self.path, &what))
     }
     fn origin(&self) -> f64 {

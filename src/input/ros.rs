@@ -3,9 +3,11 @@
 //! Units are those of the message definition and REP 103: rad/s, m/s². The time of a row is that of the message header, in nanoseconds; when it
 //! was recorded is `log_time`.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::InputError;
+use super::account::{Account, Excess};
 use super::bytes::{Bytes, Short, zstd};
 use super::names::Head;
 use super::number::Split;
@@ -26,7 +28,7 @@ pub(super) enum Encoding {
 }
 
 /// One stream of messages.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Channel {
     pub(super) topic: String,
     /// `sensor_msgs/msg/Imu`.
@@ -44,7 +46,7 @@ impl Channel {
 /// A file of messages of many topics.
 pub(super) trait Bag: Send + Sized + 'static {
     const FORMAT: &'static str;
-    fn open(path: &Path) -> Result<Self, String>;
+    fn open(path: &Path, account: &Account) -> Result<Self, String>;
     fn rewind(&mut self) -> Result<(), String>;
     /// The number of the channel of the next message, and when it was recorded, in nanoseconds.
     fn next(&mut self) -> Result<Option<(u32, u64)>, String>;
@@ -100,18 +102,23 @@ fn imu(encoding: Encoding, message: &[u8], log_time: u64, row: &mut Vec<Split>) 
 }
 
 /// Opens a bag and counts what is in it.
-pub(super) fn open<B: Bag>(path: &Path) -> Result<RecordSource, InputError> {
+pub(super) fn open<B: Bag>(path: &Path, account: &Account) -> Result<RecordSource, InputError> {
     let fail = |what: String| failure(path, &what);
-    let mut bag = B::open(path).map_err(fail)?;
+    let over = |excess: Excess| fail(excess.into());
+    let mut bag = B::open(path, account).map_err(fail)?;
+    let mut places: BTreeMap<String, usize> = BTreeMap::new();
     let mut topics: Vec<Topic> = Vec::new();
     let mut row = Vec::new();
     while let Some((number, log_time)) = bag.next().map_err(fail)? {
         let Some(channel) = bag.channel(number) else { continue };
-        let at = match topics.iter().position(|topic| topic.name == channel.topic) {
-            Some(at) => at,
+        let at = match places.get(&channel.topic) {
+            Some(&at) => at,
             None if topics.len() == MOST_TOPICS => continue,
             None => {
                 let heads = if channel.is_imu() { heads() } else { Vec::new() };
+                account.name(channel.topic.len()).map_err(over)?;
+                account.columns(1 + heads.len() as u64, channel.topic.len().max(30)).map_err(over)?;
+                places.insert(channel.topic.clone(), topics.len());
                 topics.push(Topic { kind: channel.kind.clone(), ..Topic::new(channel.topic.clone(), heads) });
                 topics.len() - 1
             }
@@ -126,12 +133,14 @@ pub(super) fn open<B: Bag>(path: &Path) -> Result<RecordSource, InputError> {
     if topics.is_empty() {
         return Err(fail(bag.damage().unwrap_or_else(|| "no messages in it".into())));
     }
-    let (file, names) = (path.to_path_buf(), topics.iter().map(|topic| topic.name.clone()).collect::<Vec<_>>());
+    let (file, drawn) = (path.to_path_buf(), account.clone());
+    let names: Vec<String> = topics.iter().map(|topic| topic.name.clone()).collect();
     let messages = move |topic: usize| {
-        let bag = B::open(&file)?;
+        let bag = B::open(&file, &drawn)?;
         Ok(Box::new(BagTopic { bag, topic: names[topic].clone(), damaged: 0 }) as Box<dyn Messages>)
     };
-    Ok(RecordSource { format: B::FORMAT, path: path.to_path_buf(), topics, messages: Box::new(messages) })
+    let (path, account) = (path.to_path_buf(), account.clone());
+    Ok(RecordSource { format: B::FORMAT, path, account, topics, messages: Box::new(messages) })
 }
 
 /// The messages of one topic.
@@ -169,6 +178,7 @@ impl<B: Bag> Messages for BagTopic<B> {
 /// The file's blocks one behind the other, and what of them could not be read.
 pub(super) struct Blocks {
     reader: std::io::BufReader<std::fs::File>,
+    pub(super) account: Account,
     pub(super) at: u64,
     length: u64,
     first_damage: Option<(u64, String)>,
@@ -176,12 +186,12 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
-    pub(super) fn open(path: &Path) -> Result<Blocks, String> {
+    pub(super) fn open(path: &Path, account: &Account) -> Result<Blocks, String> {
         let io = |error: std::io::Error| format!("cannot read: {error}");
         let file = std::fs::File::open(path).map_err(io)?;
         let length = file.metadata().map_err(io)?.len();
         let reader = std::io::BufReader::with_capacity(1 << 16, file);
-        Ok(Blocks { reader, at: 0, length, first_damage: None, passed_over: 0 })
+        Ok(Blocks { reader, account: account.clone(), at: 0, length, first_damage: None, passed_over: 0 })
     }
     pub(super) fn jump(&mut self, at: u64) -> Result<(), String> {
         use std::io::{Seek, SeekFrom};
@@ -222,8 +232,37 @@ impl Blocks {
     }
 }
 
+/// Keeps a channel, unless it is known as it is: bags repeat them.
+pub(super) fn keep(
+    channels: &mut BTreeMap<u32, Channel>,
+    number: u32,
+    channel: Channel,
+    account: &Account,
+) -> Result<(), Excess> {
+    if channels.get(&number) != Some(&channel) {
+        account.name(channel.topic.len())?;
+        account.name(channel.kind.len())?;
+        channels.insert(number, channel);
+    }
+    Ok(())
+}
+
 /// A compressed block. `size`: what it is declared to hold, and no more is read.
-pub(super) fn decompress(compression: &str, data: &[u8], size: u64) -> Result<Vec<u8>, String> {
+pub(super) fn decompress(
+    compression: &str,
+    data: &[u8],
+    size: u64,
+    account: &Account,
+) -> Result<Result<Vec<u8>, String>, Excess> {
+    if !["", "none"].contains(&compression) {
+        account.work(size)?;
+        // beside it the window of what takes it apart, and the record that is taken out of it
+        account.room(size.saturating_mul(3))?;
+    }
+    Ok(unpacked(compression, data, size))
+}
+
+fn unpacked(compression: &str, data: &[u8], size: u64) -> Result<Vec<u8>, String> {
     use std::io::Read;
     let mut out = Vec::new();
     let read = match compression {

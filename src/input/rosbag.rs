@@ -4,8 +4,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use super::account::{Account, Excess, LONGEST_NAME, STEP};
 use super::bytes::{Bytes, printable};
-use super::ros::{Bag, Blocks, Channel, Encoding, decompress};
+use super::ros::{Bag, Blocks, Channel, Encoding, decompress, keep};
 
 pub(super) const SIGNATURE: &[u8] = b"#ROSBAG V2.0\n";
 
@@ -40,23 +41,28 @@ fn fields(header: &[u8]) -> impl Fn(&str) -> Option<Vec<u8>> + '_ {
 
 impl Rosbag {
     /// A record: its code and, of a message, connection and time; its data are in `message`.
-    fn record(&mut self) -> Option<(u8, u32, u64)> {
+    fn record(&mut self) -> Result<Option<(u8, u32, u64)>, String> {
         let field = fields(&self.header);
         let number = |name: &str| field(name).and_then(|value| Bytes(&value).number(value.len().min(8)).ok());
-        let code = number("op")? as u8;
+        self.blocks.account.work(STEP)?;
+        let Some(code) = number("op").map(|code| code as u8) else { return Ok(None) };
         let connection = number("conn").unwrap_or(u64::MAX) as u32;
         if code == CONNECTION && field("topic").is_some() {
-            let text = |value: Option<Vec<u8>>| value.map(|value| printable(&value));
-            let kind = text(fields(&self.message)("type")).unwrap_or_default();
-            let topic = text(field("topic")).unwrap_or_default();
-            self.channels.insert(connection, Channel { topic, kind, encoding: Encoding::Ros1 });
+            let text = |value: Option<Vec<u8>>| match value.unwrap_or_default() {
+                long if long.len() > LONGEST_NAME => Err(Excess::Name(long.len())),
+                value => Ok(printable(&value)),
+            };
+            let kind = text(fields(&self.message)("type"))?;
+            let topic = text(field("topic"))?;
+            let channel = Channel { topic, kind, encoding: Encoding::Ros1 };
+            keep(&mut self.channels, connection, channel, &self.blocks.account)?;
         }
         let time = number("time").unwrap_or(0);
-        Some((code, connection, (time & 0xffff_ffff) * 1_000_000_000 + (time >> 32)))
+        Ok(Some((code, connection, (time & 0xffff_ffff) * 1_000_000_000 + (time >> 32))))
     }
 
     /// The next record of the chunk that is open.
-    fn inside(&mut self) -> Option<(u8, u32, u64)> {
+    fn inside(&mut self) -> Result<Option<(u8, u32, u64)>, String> {
         let mut bytes = Bytes(&self.chunk[self.used..]);
         let whole = bytes.0.len();
         let mut part = |into: &mut Vec<u8>| {
@@ -70,7 +76,7 @@ impl Rosbag {
         if read.is_none() {
             self.blocks.damaged(0, "a block ends inside a record");
             self.used = self.chunk.len();
-            return None;
+            return Ok(None);
         }
         self.record()
     }
@@ -79,8 +85,8 @@ impl Rosbag {
 impl Bag for Rosbag {
     const FORMAT: &'static str = "ROS 1 bag";
 
-    fn open(path: &Path) -> Result<Self, String> {
-        let blocks = Blocks::open(path)?;
+    fn open(path: &Path, account: &Account) -> Result<Self, String> {
+        let blocks = Blocks::open(path, account)?;
         let (channels, chunk, header, message) = (BTreeMap::new(), Vec::new(), Vec::new(), Vec::new());
         let mut bag = Rosbag { blocks, channels, chunk, used: 0, header, message };
         bag.rewind()?;
@@ -94,7 +100,7 @@ impl Bag for Rosbag {
     fn next(&mut self) -> Result<Option<(u32, u64)>, String> {
         loop {
             while self.used < self.chunk.len() {
-                if let Some((MESSAGE, connection, time)) = self.inside() {
+                if let Some((MESSAGE, connection, time)) = self.inside()? {
                     return Ok(Some((connection, time)));
                 }
             }
@@ -112,13 +118,14 @@ impl Bag for Rosbag {
                     return Ok(None);
                 }
             }
-            match self.record() {
+            match self.record()? {
                 Some((MESSAGE, connection, time)) => return Ok(Some((connection, time))),
                 Some((CHUNK, ..)) => {
                     let field = fields(&self.header);
                     let compression = field("compression").unwrap_or_default();
                     let size = field("size").and_then(|size| Bytes(&size).u32().ok()).unwrap_or(0);
-                    match decompress(&printable(&compression), &self.message, u64::from(size)) {
+                    let (name, account) = (printable(&compression), &self.blocks.account);
+                    match decompress(&name, &self.message, u64::from(size), account)? {
                         Ok(chunk) => (self.chunk, self.used) = (chunk, 0),
                         Err(why) => self.blocks.damaged(self.message.len() as u64, &why),
                     }

@@ -76,7 +76,7 @@ impl Choice {
             to_si(unit, &mut rows.time);
         }
         let beside = self.temperature.column.as_ref().map(|(_, info)| &info.unit);
-        let units = self.axes.iter().map(|axis| &axis.unit).chain(&self.extra).chain(beside);
+        let units = self.stored.iter().chain(&self.extra).chain(beside);
         for (column, unit) in rows.values.iter_mut().zip(units) {
             to_si(unit, column);
             // what no sensor gives would spoil every sum it enters

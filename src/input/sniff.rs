@@ -1,6 +1,8 @@
 //! What a text log looks like: delimiter, decimal sign, header, first row of numbers; found from the beginning of the file.
 
+use super::account::Account;
 use super::names::{Head, is_rate};
+use crate::units::plain;
 
 /// How the fields of a line are separated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -153,7 +155,7 @@ struct Line<'a> {
 }
 
 /// The form of the log that begins with `sample` (without byte-order mark; `whole`: nothing follows), or why it is none.
-pub(super) fn layout(sample: &[u8], whole: bool) -> Result<Layout, String> {
+pub(super) fn layout(sample: &[u8], whole: bool, account: &Account) -> Result<Layout, String> {
     const LINES: usize = 4000;
     let (mut body, mut comments) = (Vec::new(), Vec::new());
     let mut lines: Vec<&[u8]> = sample.split(|b| *b == b'\n').collect();
@@ -184,7 +186,7 @@ pub(super) fn layout(sample: &[u8], whole: bool) -> Result<Layout, String> {
     else {
         return Err("no rows of numbers found".into());
     };
-    describe(&body, &comments, delimiter, decimal_comma, usual)
+    describe(&body, &comments, delimiter, decimal_comma, usual, account)
 }
 
 /// For each number of fields a line has: how many cells of such lines are numbers.
@@ -210,10 +212,12 @@ fn describe(
     delimiter: Delimiter,
     decimal_comma: bool,
     usual: usize,
+    account: &Account,
 ) -> Result<Layout, String> {
     // a separator behind the last field of every row makes no further column
     let dangling = usual > 1 && body.iter().map(|l| shape(l.text, delimiter)).all(|(n, empty)| n != usual || empty);
     let columns = if dangling { usual - 1 } else { usual };
+    account.columns(columns as u64, 8)?;
     let fits = |text: &[u8]| {
         let (n, last_empty) = shape(text, delimiter);
         n == columns || (n == columns + 1 && last_empty)
@@ -225,13 +229,14 @@ fn describe(
         return Err("no rows of numbers found".into());
     };
     let table = &body[start..];
-    let names = |text: &[u8]| -> Vec<Head> {
+    let names = |text: &[u8]| -> Result<Vec<Head>, String> {
+        fields(text, delimiter).take(columns).try_for_each(|name| account.columns(1, name.len()))?;
         let mut heads: Vec<Head> = fields(text, delimiter)
             .take(columns)
             .map(|f| Head::parse(&String::from_utf8_lossy(f).replace("\"\"", "\"").replace('"', "")))
             .collect();
         heads.resize_with(columns, || Head::parse(""));
-        heads
+        Ok(heads)
     };
     let first = numeric(table[0].text);
     // names stand above numbers: some cell is text where the next row that fits has a number, or no cell is a number
@@ -254,7 +259,7 @@ fn describe(
         rate: None,
     };
     if is_header {
-        layout.heads = names(table[0].text);
+        layout.heads = names(table[0].text)?;
         layout.named = true;
         layout.header_line = table[0].number;
         layout.first_line = table[0].number + 1;
@@ -274,7 +279,7 @@ fn describe(
         let text = &text[text.iter().position(|b| !b"#%/ \t".contains(b)).unwrap_or(text.len())..];
         let letters = fields(text, delimiter).any(|f| f.iter().any(u8::is_ascii_alphabetic));
         if columns > 1 && letters && shape(text, delimiter).0 == columns {
-            layout.heads = names(text);
+            layout.heads = names(text)?;
             layout.named = true;
             layout.header_line = comment.number;
         }
@@ -284,7 +289,7 @@ fn describe(
     Ok(layout)
 }
 
-/// `// Update Rate: 100.0Hz`, `Sample rate (Hz),100`: only in hertz, and only where it says so.
+/// `// Update Rate: 100.0Hz`, `Sample rate (Hz),100`; `Fs,100` means hertz, as in the files of arrays. Other names must say it.
 fn said_rate(line: &str) -> Option<(String, f64)> {
     let (name, value) = line.trim_matches(|c: char| "#%/\" \t".contains(c)).split_once([':', '=', ',', ';', '\t'])?;
     let (name, value) = (name.trim_matches([' ', '"']), value.trim_matches([' ', '"', ',', ';', '\t']));
@@ -292,11 +297,12 @@ fn said_rate(line: &str) -> Option<(String, f64)> {
     let number = match lower.strip_suffix("hz") {
         Some(number) => number.trim_end(),
         None if name.to_ascii_lowercase().trim_end_matches([')', ']']).ends_with("hz") => &lower,
+        None if name.eq_ignore_ascii_case("fs") => &lower,
         None => return None,
     };
     let stem = name.split(['(', '[']).next().unwrap_or(name);
     let rate = number.parse::<f64>().ok().filter(|rate| rate.is_finite() && *rate > 0.0)?;
-    (is_rate(name) || is_rate(stem)).then(|| (name.to_string(), rate))
+    (is_rate(name) || is_rate(stem)).then(|| (plain(name).into_owned(), rate))
 }
 
 /// Units or nothing in every cell.

@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use super::account::Account;
 use super::names::Head;
 use super::{
     InputError, LogOptions, Table, arrays, columns, dataflash, hdf5, mat, mcap, npy, parquet, ros, rosbag, sqlite,
@@ -20,8 +21,10 @@ pub(super) struct Topic {
     pub(super) heads: Vec<Head>,
     /// False when the columns have only numbers.
     pub(super) named: bool,
-    /// Of messages: their type.
+    /// Of messages: their type; of an object: its class.
     pub(super) kind: String,
+    /// An object of MATLAB, which cannot be read.
+    pub(super) object: bool,
     /// Where the file says it, or the reader has counted.
     pub(super) rows: Option<u64>,
     /// First and last stamp, s, where the reader has counted.
@@ -33,7 +36,15 @@ pub(super) struct Topic {
 impl Topic {
     pub(super) fn new(name: String, heads: Vec<Head>) -> Topic {
         let (aliases, kind) = (Vec::new(), String::new());
-        Topic { name, aliases, heads, named: true, kind, rows: None, span_s: None, rank: 0 }
+        Topic { name, aliases, heads, named: true, kind, object: false, rows: None, span_s: None, rank: 0 }
+    }
+}
+
+impl Topic {
+    /// What to say of an object.
+    pub(super) fn unread_object(&self) -> String {
+        let class = &self.kind;
+        format!("a MATLAB object of the class '{class}', which cannot be read; save what is in it as arrays of numbers")
     }
 }
 
@@ -42,14 +53,16 @@ pub(super) trait Source: Send {
     /// "HDF5", "PX4 ULog".
     fn format(&self) -> &'static str;
     fn topics(&self) -> &[Topic];
-    fn table(self: Box<Self>, topic: usize) -> Result<Box<dyn Table + Send>, InputError>;
+    /// Another topic each time.
+    fn table(&mut self, topic: usize) -> Result<Box<dyn Table + Send>, InputError>;
 }
 
 /// A file with one table.
 struct Single {
     format: &'static str,
     topic: [Topic; 1],
-    table: Box<dyn Table + Send>,
+    /// Until it is handed out.
+    table: Option<Box<dyn Table + Send>>,
 }
 
 impl Single {
@@ -57,7 +70,7 @@ impl Single {
         let heads = table.heads().into_iter().cloned().collect();
         let (named, rows) = (table.named(), table.rows());
         let topic = Topic { named, rows, ..Topic::new(String::new(), heads) };
-        Single { format, topic: [topic], table }
+        Single { format, topic: [topic], table: Some(table) }
     }
 }
 
@@ -68,8 +81,8 @@ impl Source for Single {
     fn topics(&self) -> &[Topic] {
         &self.topic
     }
-    fn table(self: Box<Self>, _: usize) -> Result<Box<dyn Table + Send>, InputError> {
-        Ok(self.table)
+    fn table(&mut self, _: usize) -> Result<Box<dyn Table + Send>, InputError> {
+        self.table.take().ok_or_else(|| InputError { message: "its only table is being read".into() })
     }
 }
 
@@ -106,46 +119,51 @@ pub(super) fn resolve(path: &Path) -> Result<PathBuf, InputError> {
 pub(super) fn open(path: &Path) -> Result<Box<dyn Source>, InputError> {
     let fail = |what: String| Err(InputError { message: format!("{}: {what}", path.display()) });
     let mut start = Vec::new();
-    if let Err(error) = File::open(path).and_then(|file| file.take(4096).read_to_end(&mut start)) {
-        return fail(format!("cannot read: {error}"));
-    }
+    let opened = File::open(path).and_then(|file| {
+        let length = file.metadata()?.len();
+        file.take(4096).read_to_end(&mut start).map(|_| length)
+    });
+    let account = match opened {
+        Ok(length) => &Account::new(length),
+        Err(error) => return fail(format!("cannot read: {error}")),
+    };
     let npy = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy"));
     if npy || start.starts_with(b"\x93NUMPY") {
-        return Ok(Box::new(Single::new("NumPy array", Box::new(npy::NpyTable::open(path)?))));
+        return Ok(Box::new(Single::new("NumPy array", Box::new(npy::NpyTable::open(path, account)?))));
     }
     // a file may have a block of its user's before the signature: MATLAB 7.3 has 512 bytes of text
     if [0, 512, 1024, 2048].iter().any(|&at| start.get(at..).is_some_and(|rest| rest.starts_with(hdf5::SIGNATURE))) {
-        return Ok(Box::new(arrays::ArraySource::new(path, Box::new(hdf5::Hdf5::open(path)?))?));
+        return Ok(Box::new(arrays::ArraySource::new(path, Box::new(hdf5::Hdf5::open(path, account)?), account)?));
     }
     if start.starts_with(mat::SIGNATURE) {
-        return Ok(Box::new(arrays::ArraySource::new(path, Box::new(mat::Mat::open(path)?))?));
+        return Ok(Box::new(arrays::ArraySource::new(path, Box::new(mat::Mat::open(path, account)?), account)?));
     }
     let is = |signature: &[u8]| start.starts_with(signature);
     if is(ulog::SIGNATURE) {
-        return Ok(Box::new(ulog::open(path)?));
+        return Ok(Box::new(ulog::open(path, account)?));
     }
     if is(dataflash::SIGNATURE) {
-        return Ok(Box::new(dataflash::open(path)?));
+        return Ok(Box::new(dataflash::open(path, account)?));
     }
     if is(parquet::SIGNATURE) || is(parquet::ENCRYPTED) {
-        return Ok(Box::new(Single::new("Parquet", Box::new(parquet::ParquetTable::open(path)?))));
+        return Ok(Box::new(Single::new("Parquet", Box::new(parquet::ParquetTable::open(path, account)?))));
     }
     if is(rosbag::SIGNATURE) {
-        return Ok(Box::new(ros::open::<rosbag::Rosbag>(path)?));
+        return Ok(Box::new(ros::open::<rosbag::Rosbag>(path, account)?));
     }
     if is(mcap::SIGNATURE) {
-        return Ok(Box::new(ros::open::<mcap::Mcap>(path)?));
+        return Ok(Box::new(ros::open::<mcap::Mcap>(path, account)?));
     }
     if is(sqlite::SIGNATURE) {
-        return Ok(Box::new(ros::open::<sqlite::Database>(path)?));
+        return Ok(Box::new(ros::open::<sqlite::Database>(path, account)?));
     }
-    Ok(Box::new(Single::new("text", Box::new(text::TextTable::open(path)?))))
+    Ok(Box::new(Single::new("text", Box::new(text::TextTable::open(path, account)?))))
 }
 
 /// The table that is meant, and a sentence on which it is where others could be.
 pub(super) fn choose(
     path: &Path,
-    source: Box<dyn Source>,
+    mut source: Box<dyn Source>,
     options: &LogOptions,
 ) -> Result<(Box<dyn Table + Send>, Option<String>), InputError> {
     let fail = |what: String| Err(InputError { message: format!("{}: {what}", path.display()) });
@@ -155,9 +173,13 @@ pub(super) fn choose(
         let is = |name: &String| *name == lower || name.strip_suffix(":0").is_some_and(|stem| stem == lower);
         let named =
             |topic: &Topic| [&topic.name].into_iter().chain(&topic.aliases).any(|name| is(&name.to_lowercase()));
-        return match topics.iter().position(named) {
+        let found = topics.iter().position(named);
+        return match found {
             Some(at) if topics[at].heads.is_empty() => {
                 let (name, kind) = (&topics[at].name, &topics[at].kind);
+                if topics[at].object {
+                    return fail(format!("{name} is {}", topics[at].unread_object()));
+                }
                 fail(format!("topic {name} has messages of the type '{kind}', which are not read; sensor_msgs/Imu are"))
             }
             Some(topic) => Ok((source.table(topic)?, None)),
@@ -167,8 +189,9 @@ pub(super) fn choose(
             None => fail(format!("no topic '{wanted}'; {}", there_are(topics))),
         };
     }
-    if topics.len() == 1 && !topics[0].heads.is_empty() {
-        return Ok((source.table(0)?, None));
+    let mut readable = (0..topics.len()).filter(|&i| !topics[i].heads.is_empty());
+    if let (Some(only), None) = (readable.next(), readable.next()) {
+        return Ok((source.table(only)?, None));
     }
     let quantities: &[Quantity] = match options.sought() {
         Some(Quantity::AngularRate) => &[Quantity::AngularRate],
@@ -218,6 +241,7 @@ fn there_are(topics: &[Topic]) -> String {
     let one = |topic: &Topic| {
         let rows = topic.rows.unwrap_or(0);
         match (topic.heads.is_empty(), topics.len() <= WITH_COLUMNS) {
+            (true, _) if topic.object => format!("{} ({}, an object)", topic.name, topic.kind),
             (true, _) => format!("{} ({rows} {})", topic.name, topic.kind),
             (false, true) => format!("{} ({rows} rows{})", topic.name, columns(topic)),
             (false, false) => format!("{} ({rows} rows)", topic.name),

@@ -7,12 +7,14 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
+use super::account::{Account, DEEPEST, Excess, Fault, JUMP, STEP};
 use super::bytes::{Bytes, Short, printable};
-use super::ros::{Bag, Channel, Encoding};
+use super::ros::{Bag, Channel, Encoding, keep};
 
 pub(super) const SIGNATURE: &[u8] = b"SQLite format 3\0";
 
-const DEEPEST: usize = 20;
+/// A row of the tables of a bag has fewer columns.
+const MOST_VALUES: usize = 32;
 const LEAF: u8 = 13;
 const INTERIOR: u8 = 5;
 
@@ -31,8 +33,8 @@ struct Pages {
     /// Bytes of a page that hold content.
     usable: usize,
     count: u32,
-    /// Pages that a pass may still read: a tree that leads back to itself ends here.
-    budget: u64,
+    /// A tree that leads back to itself ends here.
+    account: Account,
     damaged: u64,
 }
 
@@ -78,11 +80,11 @@ fn varint(bytes: &mut Bytes) -> Result<u64, Short> {
 }
 
 impl Pages {
-    fn page(&mut self, number: u32) -> Result<Vec<u8>, Short> {
-        if number == 0 || number > self.count || self.budget == 0 {
-            return Err(Short);
+    fn page(&mut self, number: u32) -> Result<Vec<u8>, Fault> {
+        if number == 0 || number > self.count {
+            return Err(Fault::Short);
         }
-        self.budget -= 1;
+        self.account.work(JUMP + self.size as u64)?;
         let mut page = vec![0; self.size];
         let at = SeekFrom::Start(u64::from(number - 1) * self.size as u64);
         self.file.seek(at).and_then(|_| self.file.read_exact(&mut page)).map_err(|_| Short)?;
@@ -90,13 +92,16 @@ impl Pages {
     }
 
     /// Content of a cell of a leaf: the number of its row, and the row. `left`: bytes that cells of this page may still have.
-    fn cell(&mut self, page: &[u8], at: usize, left: &mut usize) -> Result<(u64, Vec<u8>), Short> {
+    fn cell(&mut self, page: &[u8], at: usize, left: &mut usize) -> Result<(u64, Vec<u8>), Fault> {
+        self.account.work(STEP)?;
         let mut bytes = Bytes(page.get(at..).ok_or(Short)?);
         let size = varint(&mut bytes)?;
         let row = varint(&mut bytes)?;
         if size > u64::from(self.count) * self.size as u64 {
-            return Err(Short);
+            return Err(Fault::Short);
         }
+        // as it lies in the pages, grown by doubling, and what of it is kept
+        self.account.room(size.saturating_mul(3))?;
         let (size, usable) = (size as usize, self.usable);
         let most = usable - 35;
         let least = (usable - 12) * 32 / 255 - 23;
@@ -119,7 +124,7 @@ impl Pages {
     }
 
     /// The next row of a table.
-    fn next(&mut self, walk: &mut Walk) -> Option<(u64, Vec<u8>)> {
+    fn next(&mut self, walk: &mut Walk) -> Result<Option<(u64, Vec<u8>)>, Excess> {
         while let Some(Place { number, page, cell, left }) = walk.stack.last_mut() {
             let start = if *number == 1 { 100 } else { 0 };
             let (kind, count) = (page[start], big(&page[start + 3..start + 5]) as usize);
@@ -130,8 +135,9 @@ impl Pages {
             let child = match (kind, place) {
                 (LEAF, Some(at)) if index < count => {
                     match self.cell(page, at, left) {
-                        Ok(found) => return Some(found),
-                        Err(Short) => self.damaged += 1,
+                        Ok(found) => return Ok(Some(found)),
+                        Err(Fault::Short) => self.damaged += 1,
+                        Err(Fault::Excess(excess)) => return Err(excess),
                     }
                     continue;
                 }
@@ -148,33 +154,36 @@ impl Pages {
                 }
             };
             match child.and_then(|child| u32::try_from(child).ok()) {
-                Some(child) if walk.stack.len() < DEEPEST => self.enter(walk, child),
+                Some(child) if walk.stack.len() < DEEPEST => self.enter(walk, child)?,
                 _ => self.damaged += 1,
             }
         }
-        None
+        Ok(None)
     }
 
-    fn enter(&mut self, walk: &mut Walk, page: u32) {
+    fn enter(&mut self, walk: &mut Walk, page: u32) -> Result<(), Excess> {
         match self.page(page) {
             Ok(content) => walk.stack.push(Place { number: page, page: content, cell: 0, left: self.usable }),
-            Err(Short) => self.damaged += 1,
+            Err(Fault::Short) => self.damaged += 1,
+            Err(Fault::Excess(excess)) => return Err(excess),
         }
+        Ok(())
     }
 
     /// All rows of a small table.
-    fn all(&mut self, root: u32) -> Vec<(u64, Vec<Value>)> {
+    fn all(&mut self, root: u32) -> Result<Vec<(u64, Vec<Value>)>, Excess> {
         const MOST: usize = 10_000;
         let mut walk = Walk::default();
-        self.enter(&mut walk, root);
+        self.enter(&mut walk, root)?;
         let mut rows = Vec::new();
-        while let Some((row, content)) = self.next(&mut walk) {
+        while let Some((row, content)) = self.next(&mut walk)? {
+            self.account.hold((MOST_VALUES * size_of::<Value>() + content.len()) as u64)?;
             rows.extend(values(&content).ok().map(|values| (row, values)));
             if rows.len() == MOST {
                 break;
             }
         }
-        rows
+        Ok(rows)
     }
 }
 
@@ -186,6 +195,9 @@ fn values(content: &[u8]) -> Result<Vec<Value>, Short> {
     let mut body = Bytes(content.get(size..).ok_or(Short)?);
     let mut values = Vec::new();
     while !header.0.is_empty() {
+        if values.len() == MOST_VALUES {
+            return Err(Short);
+        }
         let mut number = |size: usize| {
             let unused = 64 - 8 * size as u32;
             body.take(size).map(|bytes| Value::Number(((big(bytes) << unused) as i64) >> unused))
@@ -216,7 +228,7 @@ fn text(value: Option<&Value>) -> String {
 impl Bag for Database {
     const FORMAT: &'static str = "ROS 2 bag (sqlite)";
 
-    fn open(path: &Path) -> Result<Self, String> {
+    fn open(path: &Path, account: &Account) -> Result<Self, String> {
         let io = |error: std::io::Error| format!("cannot read: {error}");
         let mut file = File::open(path).map_err(io)?;
         let length = file.metadata().map_err(io)?.len();
@@ -231,11 +243,10 @@ impl Bag for Database {
             return Err(format!("damaged: pages of {size} bytes"));
         }
         let count = (length / size as u64).min(u64::from(u32::MAX)) as u32;
-        let budget = 4 * u64::from(count) + 100;
-        let mut pages = Pages { file, size, usable, count, budget, damaged: 0 };
+        let mut pages = Pages { file, size, usable, count, account: account.clone(), damaged: 0 };
         // the table of tables: type, name, table, first page, and how it was made
         let (mut topics, mut root, mut names) = (0, 0, Vec::new());
-        for (_, row) in pages.all(1) {
+        for (_, row) in pages.all(1)? {
             let (name, page) = (text(row.get(1)), row.get(3));
             if text(row.first()) != "table" {
                 continue;
@@ -254,9 +265,10 @@ impl Bag for Database {
             ));
         }
         let mut channels = BTreeMap::new();
-        for (number, row) in pages.all(topics) {
+        for (number, row) in pages.all(topics)? {
             let encoding = if text(row.get(3)) == "cdr" { Encoding::Cdr } else { Encoding::Other };
-            channels.insert(number as u32, Channel { topic: text(row.get(1)), kind: text(row.get(2)), encoding });
+            let channel = Channel { topic: text(row.get(1)), kind: text(row.get(2)), encoding };
+            keep(&mut channels, number as u32, channel, account)?;
         }
         let mut database = Database { pages, channels, root, walk: Walk::default(), message: Vec::new() };
         database.rewind()?;
@@ -264,13 +276,11 @@ impl Bag for Database {
     }
     fn rewind(&mut self) -> Result<(), String> {
         self.walk.stack.clear();
-        self.pages.budget = 4 * u64::from(self.pages.count) + 100;
         self.pages.damaged = 0;
-        self.pages.enter(&mut self.walk, self.root);
-        Ok(())
+        Ok(self.pages.enter(&mut self.walk, self.root)?)
     }
     fn next(&mut self) -> Result<Option<(u32, u64)>, String> {
-        while let Some((_, content)) = self.pages.next(&mut self.walk) {
+        while let Some((_, content)) = self.pages.next(&mut self.walk)? {
             // number, topic, time, message
             let Ok(mut row) = values(&content) else {
                 self.pages.damaged += 1;

@@ -15,6 +15,7 @@ use flate2::bufread::MultiGzDecoder;
 
 use self::ahead::{Ahead, CHUNK};
 use self::row::{Fault, Form, Slot};
+use super::account::{Account, Metered};
 use super::names::Head;
 use super::sniff::{self, Layout};
 use super::{BLOCK, InputError, Rows, Table};
@@ -29,6 +30,7 @@ const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 pub(super) struct TextTable {
     path: PathBuf,
+    account: Account,
     layout: Layout,
     form: Form,
     source: Source,
@@ -59,7 +61,7 @@ fn fail<T>(path: &Path, what: impl std::fmt::Display) -> Result<T, InputError> {
     Err(InputError { message: format!("{}: {what}", path.display()) })
 }
 
-fn open(path: &Path) -> Result<Source, InputError> {
+fn open(path: &Path, account: &Account) -> Result<Source, InputError> {
     // less than a chunk, which is then read without a copy
     const BUFFER: usize = 1 << 16;
     const UNPACKED: usize = 1 << 18;
@@ -70,7 +72,8 @@ fn open(path: &Path) -> Result<Source, InputError> {
     let mut reader = BufReader::with_capacity(BUFFER, file);
     match reader.fill_buf() {
         Ok([0x1f, 0x8b, ..]) => {
-            let reader = Box::new(BufReader::with_capacity(UNPACKED, MultiGzDecoder::new(reader)));
+            let unpacked = Metered { inner: MultiGzDecoder::new(reader), account: account.clone() };
+            let reader = Box::new(BufReader::with_capacity(UNPACKED, unpacked));
             Ok(Source { reader, step: UNPACKED / 2 })
         }
         Ok(_) => Ok(Source { reader: Box::new(reader), step: usize::MAX }),
@@ -79,9 +82,9 @@ fn open(path: &Path) -> Result<Source, InputError> {
 }
 
 impl TextTable {
-    pub(super) fn open(path: &Path) -> Result<TextTable, InputError> {
+    pub(super) fn open(path: &Path, account: &Account) -> Result<TextTable, InputError> {
         let mut sample = Vec::new();
-        if let Err(error) = open(path)?.reader.take(SAMPLE as u64).read_to_end(&mut sample) {
+        if let Err(error) = open(path, account)?.reader.take(SAMPLE as u64).read_to_end(&mut sample) {
             return fail(path, format!("cannot read: {error}"));
         }
         let whole = sample.len() < SAMPLE;
@@ -92,7 +95,7 @@ impl TextTable {
         if let Some(what) = not_text(text) {
             return fail(path, what);
         }
-        let layout = match sniff::layout(text, whole) {
+        let layout = match sniff::layout(text, whole, account) {
             Ok(layout) => layout,
             Err(why) => return fail(path, why),
         };
@@ -100,10 +103,11 @@ impl TextTable {
         let form = Form { delimiter: layout.delimiter, decimal_comma: layout.decimal_comma, slots, origin: None };
         let lines = text.iter().filter(|b| **b == b'\n').count() as u64;
         let length = std::fs::metadata(path).map_or(0, |file| file.len());
-        let source = open(path)?;
+        let source = open(path, account)?;
         let about = (source.step == usize::MAX && lines > 0).then(|| length / (text.len() as u64 / lines).max(1) + 1);
         Ok(TextTable {
             path: path.to_path_buf(),
+            account: account.clone(),
             layout,
             form,
             source,
@@ -233,7 +237,8 @@ impl Table for TextTable {
         }
     }
     fn rewind(&mut self) -> Result<(), InputError> {
-        self.source = open(&self.path)?;
+        self.account.renew();
+        self.source = open(&self.path, &self.account)?;
         (self.line_number, self.fault, self.ahead) = (0, None, None);
         Ok(())
     }

@@ -4,13 +4,15 @@
 //! up to there; where a message makes no sense, reading goes on behind the next synchronisation message, and a note says how
 //! many bytes were passed over. Data that was appended after a crash is found by the offsets in the flag message.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
 use super::InputError;
+use super::account::{Account, Excess, LONGEST_NAME, STEP, deeper};
 use super::bytes::Bytes;
+use super::names::Head;
 use super::number::{Kind, Number, Split};
 use super::records::{Field, Messages, PassedOver, RecordSource, failure, head, instance, opened, tally};
 use super::source::Topic;
@@ -19,7 +21,6 @@ pub(super) const SIGNATURE: &[u8] = b"ULog\x01\x12\x35";
 
 const SYNC: &[u8] = &[0x2f, 0x73, 0x13, 0x20, 0x25, 0x0c, 0xbb, 0x12];
 const KINDS: &[u8] = b"BFIMPQARDLCSO";
-const DEEPEST: usize = 8;
 /// A message has at most 65,535 bytes; that of the most fields, some hundred.
 const MOST_FIELDS: usize = 1 << 13;
 /// Of all topics.
@@ -77,6 +78,13 @@ struct Fifo {
 }
 
 impl Layout {
+    /// Of a message, at most.
+    fn numbers(&self) -> u64 {
+        match self {
+            Layout::Fields(fields) => fields.len() as u64,
+            Layout::Fifo(_) => 4 * 32,
+        }
+    }
     /// Appends the rows of a message; columns are as many as heads.
     fn decode(&self, message: &[u8], row: &mut Vec<Split>) {
         match self {
@@ -103,11 +111,13 @@ impl Layout {
 }
 
 /// Opens a log and counts what is in it.
-pub(super) fn open(path: &Path) -> Result<RecordSource, InputError> {
+pub(super) fn open(path: &Path, account: &Account) -> Result<RecordSource, InputError> {
     let fail = |what: String| failure(path, &what);
     let mut scanner = Scanner::open(path).map_err(fail)?;
     let mut formats: BTreeMap<String, String> = BTreeMap::new();
+    let over = |excess: Excess| fail(excess.into());
     let (mut topics, mut layouts): (Vec<Topic>, Vec<Layout>) = (Vec::new(), Vec::new());
+    let mut known: BTreeMap<String, usize> = BTreeMap::new();
     // the number of a message is given anew where a topic ends
     let mut numbers: BTreeMap<u16, usize> = BTreeMap::new();
     let (mut row, mut columns) = (Vec::new(), 0);
@@ -116,6 +126,7 @@ pub(super) fn open(path: &Path) -> Result<RecordSource, InputError> {
         match kind {
             b'F' => {
                 if let Some((name, fields)) = Bytes::text(content.0).split_once(':') {
+                    account.hold((128 + name.len() + fields.len()) as u64).map_err(over)?;
                     formats.insert(name.into(), fields.into());
                 }
             }
@@ -123,14 +134,15 @@ pub(super) fn open(path: &Path) -> Result<RecordSource, InputError> {
                 let (Ok(multi), Ok(number)) = (content.u8(), content.u16()) else { continue };
                 let format = Bytes::text(content.0);
                 let name = instance(&format, u64::from(multi));
-                let known = topics.iter().position(|topic| topic.name == name);
-                if let Some(at) = known {
+                if let Some(&at) = known.get(&name) {
                     numbers.insert(number, at);
-                } else if let Some((layout, heads)) = layout(&format, &formats)
+                } else if let Some((layout, heads)) = layout(&format, &formats, account).map_err(over)?
                     && topics.len() < MOST_TOPICS
                     && columns + heads.len() <= MOST_COLUMNS
                 {
                     columns += heads.len();
+                    account.name(name.len()).map_err(over)?;
+                    known.insert(name.clone(), topics.len());
                     let rank = match SENSORS.iter().any(|(sensor, _)| *sensor == format) {
                         true => 1 + u8::from(format != FILTERED),
                         false => 0,
@@ -143,6 +155,7 @@ pub(super) fn open(path: &Path) -> Result<RecordSource, InputError> {
             b'D' => {
                 let Some(&topic) = content.u16().ok().and_then(|number| numbers.get(&number)) else { continue };
                 row.clear();
+                account.work(layouts[topic].numbers() * STEP / 8).map_err(over)?;
                 layouts[topic].decode(content.0, &mut row);
                 let columns = topics[topic].heads.len();
                 for row in row.chunks_exact(columns) {
@@ -157,32 +170,47 @@ pub(super) fn open(path: &Path) -> Result<RecordSource, InputError> {
     if used.is_empty() {
         return Err(fail("no data in it".into()));
     }
-    let (file, names) = (path.to_path_buf(), used.iter().map(|&i| topics[i].name.clone()).collect::<Vec<_>>());
+    let (file, drawn) = (path.to_path_buf(), account.clone());
+    let names: Vec<String> = used.iter().map(|&i| topics[i].name.clone()).collect();
     let layouts: Vec<Layout> = used.iter().map(|&i| layouts[i].clone()).collect();
     let topics = used.iter().map(|&i| topics[i].clone()).collect();
     let messages = move |topic: usize| {
-        let scanner = Scanner::open(&file)?;
+        let (scanner, account) = (Scanner::open(&file)?, drawn.clone());
         let (name, layout) = (names[topic].clone(), layouts[topic].clone());
-        Ok(Box::new(UlogTopic { scanner, name, layout, numbers: Vec::new() }) as Box<dyn Messages>)
+        Ok(Box::new(UlogTopic { scanner, account, name, layout, numbers: BTreeSet::new() }) as Box<dyn Messages>)
     };
-    Ok(RecordSource { format: "PX4 ULog", path: path.to_path_buf(), topics, messages: Box::new(messages) })
+    let (path, account) = (path.to_path_buf(), account.clone());
+    Ok(RecordSource { format: "PX4 ULog", path, account, topics, messages: Box::new(messages) })
 }
 
 /// The fields of a format, those inside others too: name, first byte, number of values, type.
-fn flatten(format: &str, formats: &BTreeMap<String, String>, depth: usize) -> Option<Vec<(String, usize, Number)>> {
+fn flatten(
+    format: &str,
+    formats: &BTreeMap<String, String>,
+    depth: usize,
+    account: &Account,
+) -> Result<Option<Vec<(String, usize, Number)>>, Excess> {
     let mut fields = Vec::new();
     let mut at = 0;
-    for field in formats.get(format)?.split(';').filter(|field| !field.is_empty()) {
-        let (kind, name) = field.trim().split_once(' ')?;
-        let (kind, count) = match kind.split_once('[') {
-            Some((kind, count)) => (kind, Some(count.strip_suffix(']')?.parse::<usize>().ok()?)),
+    let Some(format) = formats.get(format) else { return Ok(None) };
+    for field in format.split(';').filter(|field| !field.is_empty()) {
+        let Some((kind, name)) = field.trim().split_once(' ') else { return Ok(None) };
+        let (kind, count) = match kind.split_once('[').map(|(kind, count)| (kind, count.strip_suffix(']'))) {
+            Some((kind, count)) => match count.and_then(|count| count.parse::<usize>().ok()) {
+                Some(count) => (kind, Some(count)),
+                None => return Ok(None),
+            },
             None => (kind, None),
         };
         for i in 0..count.unwrap_or(1) {
             let name = if count.is_some() { format!("{name}[{i}]") } else { name.to_string() };
             if fields.len() > MOST_FIELDS || at > MOST_FIELDS {
-                return None;
+                return Ok(None);
             }
+            if name.len() > LONGEST_NAME {
+                return Err(Excess::Name(name.len()));
+            }
+            account.work(4 * STEP)?;
             let kind = match kind {
                 "float" => Kind::Float(4),
                 "double" => Kind::Float(8),
@@ -194,30 +222,50 @@ fn flatten(format: &str, formats: &BTreeMap<String, String>, depth: usize) -> Op
                 "uint16_t" => Kind::Unsigned(2),
                 "uint32_t" => Kind::Unsigned(4),
                 "uint64_t" => Kind::Unsigned(8),
-                inner if depth < DEEPEST => {
-                    let inner = flatten(inner, formats, depth + 1)?;
-                    let end = inner.iter().map(|(_, at, number)| at + number.size()).max()?;
+                inner if formats.contains_key(inner) => {
+                    let Some(inner) = flatten(inner, formats, deeper(depth)?, account)? else { return Ok(None) };
+                    let Some(end) = inner.iter().map(|(_, at, number)| at + number.size()).max() else {
+                        return Ok(None);
+                    };
+                    let longest = inner.iter().map(|(field, ..)| name.len() + 1 + field.len()).max();
+                    if let Some(longest) = longest.filter(|longest| *longest > LONGEST_NAME) {
+                        return Err(Excess::Name(longest));
+                    }
                     fields.extend(
                         inner.into_iter().map(|(field, byte, kind)| (format!("{name}.{field}"), at + byte, kind)),
                     );
                     at += end;
                     continue;
                 }
-                _ => return None,
+                _ => return Ok(None),
             };
             let number = Number { kind, big_endian: false };
             fields.push((name, at, number));
             at += number.size();
         }
     }
-    Some(fields)
+    Ok(Some(fields))
 }
 
 /// Layout and columns of a format.
-fn layout(format: &str, formats: &BTreeMap<String, String>) -> Option<(Layout, Vec<super::names::Head>)> {
-    let fields = flatten(format, formats, 0)?;
+fn layout(
+    format: &str,
+    formats: &BTreeMap<String, String>,
+    account: &Account,
+) -> Result<Option<(Layout, Vec<Head>)>, Excess> {
+    let Some(fields) = flatten(format, formats, 0, account)? else { return Ok(None) };
+    // as heads and in the layout, twice each
+    fields.iter().try_for_each(|(name, ..)| account.columns(2, name.len()))?;
+    Ok(columns(format, &fields))
+}
+
+/// Of these fields.
+fn columns(format: &str, fields: &[(String, usize, Number)]) -> Option<(Layout, Vec<Head>)> {
+    // of fields of one name the first
+    let places: BTreeMap<&str, (usize, Number)> =
+        fields.iter().rev().map(|(name, at, number)| (name.as_str(), (*at, *number))).collect();
     let field = |name: &str, unit: Option<&str>, head_name: &str| {
-        let (_, at, number) = *fields.iter().find(|(field, ..)| field == name).map(|(n, at, k)| (n, at, k)).as_ref()?;
+        let (at, number) = places.get(name)?;
         let head = head(name, head_name, unit);
         Some(Field { head, at: *at, number: *number, factor: 1.0, over_us: None })
     };
@@ -264,10 +312,11 @@ fn layout(format: &str, formats: &BTreeMap<String, String>) -> Option<(Layout, V
 /// The messages of one topic.
 struct UlogTopic {
     scanner: Scanner,
+    account: Account,
     name: String,
     layout: Layout,
     /// Numbers under which the topic is logged at this place of the file.
-    numbers: Vec<u16>,
+    numbers: BTreeSet<u16>,
 }
 
 impl Messages for UlogTopic {
@@ -281,14 +330,15 @@ impl Messages for UlogTopic {
             match kind {
                 b'A' => {
                     let (Ok(multi), Ok(number)) = (content.u8(), content.u16()) else { continue };
-                    self.numbers.retain(|known| *known != number);
-                    if instance(&Bytes::text(content.0), u64::from(multi)) == self.name {
-                        self.numbers.push(number);
-                    }
+                    match instance(&Bytes::text(content.0), u64::from(multi)) == self.name {
+                        true => self.numbers.insert(number),
+                        false => self.numbers.remove(&number),
+                    };
                 }
                 b'D' => {
                     let Ok(number) = content.u16() else { continue };
                     if self.numbers.contains(&number) {
+                        self.account.work(self.layout.numbers() * STEP / 8)?;
                         self.layout.decode(content.0, row);
                         return Ok(true);
                     }

@@ -346,7 +346,7 @@ pub(super) fn axis(place: &Place<'_>, quantity: Quantity) -> Result<AxisParams, 
     let object = place.object(&known)?;
     let name = object.required("name")?;
     let text = name.text()?;
-    if text.trim().is_empty() || text.chars().any(char::is_control) {
+    if text.trim().is_empty() {
         return Err(name.error("the name of an axis must be readable"));
     }
     let base = quantity.dimension();

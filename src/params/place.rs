@@ -5,6 +5,8 @@
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Value};
 
+use crate::units::plain;
+
 /// What is wrong at one place of a document.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{key}: {message}")]
@@ -22,7 +24,7 @@ pub struct SyntaxError {
     pub message: String,
 }
 
-/// Parse JSON in which no object has a key twice.
+/// Parse JSON in which no object has a key twice. Its keys and texts are [`plain`] from here on.
 pub fn parse(text: &str) -> Result<Value, SyntaxError> {
     let text = text.trim_start_matches('\u{feff}');
     serde_json::from_str::<Strict>(text).map(|strict| strict.0).map_err(|error| {
@@ -215,7 +217,7 @@ impl<'de> Visitor<'de> for StrictVisitor {
         Ok(v.into())
     }
     fn visit_str<E>(self, v: &str) -> Result<Value, E> {
-        Ok(v.into())
+        Ok(plain(v).into_owned().into())
     }
     fn visit_unit<E>(self) -> Result<Value, E> {
         Ok(Value::Null)
@@ -231,6 +233,7 @@ impl<'de> Visitor<'de> for StrictVisitor {
         let mut map = Map::new();
         while let Some(key) = access.next_key::<String>()? {
             let Strict(value) = access.next_value()?;
+            let key = plain(&key).into_owned();
             if map.contains_key(&key) {
                 return Err(A::Error::custom(format!("key '{key}' stands twice")));
             }

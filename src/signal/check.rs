@@ -28,6 +28,11 @@ use self::together::Together;
 use super::Gap;
 use crate::units::{Quantity, Unit};
 
+/// Hz: no inertial sensor hands out more (32 kHz is the highest output data rate of the ICM-20649 and ICM-42688 families).
+const FASTEST: f64 = 32_000.0;
+/// Seconds: in which no drift can be seen, and hardly noise; stamps in seconds that are read as milliseconds make a log of minutes so short.
+const SHORTEST: f64 = 1.0;
+
 /// How time was established.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -414,6 +419,15 @@ fn time_notes(timing: &Timing, stamps: &Stamps, rate_hz: f64, rows: u64) -> Vec<
         });
     }
     repeated(stamps, &mut notes);
+    let span = rows as f64 * timing.period;
+    if rate_hz > FASTEST || span < SHORTEST {
+        let message = format!(
+            "the time stamps say {} Hz over {} s: is the unit of the time column right? --time NAME:UNIT says another where the header has none, --rate HZ takes the place of the stamps",
+            short(rate_hz),
+            short(span)
+        );
+        notes.push(Note { kind: "rate", count: 1, first: None, message, serious: true });
+    }
     notes
 }
 

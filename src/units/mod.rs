@@ -5,6 +5,7 @@
 
 mod dimension;
 mod parse;
+mod plain;
 mod symbol;
 
 use std::fmt;
@@ -12,6 +13,7 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use plain::{plain, plain_lines};
 use symbol::Symbol;
 
 /// In SI nothing that a sensor gives or has is larger, and nothing but zero smaller than its inverse: fourth powers, ratios of them, and sums of

@@ -38,7 +38,7 @@ struct Product {
 type Problem = String;
 
 pub(super) fn unit(text: &str) -> Result<Unit, UnitError> {
-    let shown = display_text(text);
+    let shown = display_text(&super::plain(&text.replace(char::is_whitespace, " ")));
     let unknown = |hint: Problem| UnitError::Unknown { found: shown.clone(), hint };
     if shown.is_empty() {
         return Err(unknown("a unit is expected, for example deg/s".into()));

@@ -1,9 +1,13 @@
 //! Where the numbers of a dataset are: in the header, in one piece, or in chunks found by an index.
 
+use std::collections::BTreeSet;
+
+use super::super::account::{STEP, deeper};
 use super::super::bytes::Bytes;
+use super::datatype::Datatype;
 use super::filters;
 use super::object::Dataset;
-use super::{DEEPEST, NOWHERE, Store};
+use super::{NOWHERE, Store};
 
 #[derive(Clone, Debug)]
 pub(super) enum Layout {
@@ -134,6 +138,7 @@ impl Dataset {
                 }
                 while done < bytes && piece > 0 {
                     let data = store.read(address + done, piece.min(bytes - done))?;
+                    store.account.work(self.steps(data.len() as u64 / size))?;
                     spread(&data, size, second, done / size, put);
                     done += data.len() as u64;
                 }
@@ -142,15 +147,22 @@ impl Dataset {
                 let shape = [first, second];
                 let extent = [chunk.first().copied().unwrap_or(1), chunk.get(1).copied().unwrap_or(1)];
                 let length = extent[0].checked_mul(extent[1]).and_then(|n| n.checked_mul(size));
-                // a deflated byte is at most 1032 bytes
-                let length =
-                    length.filter(|&n| n / 1032 <= store.length).ok_or("damaged: chunks larger than the file")?;
+                let length = length.ok_or("damaged: larger than any file")?;
                 let wanted = first.div_ceil(extent[0]).saturating_mul(second.div_ceil(extent[1]));
+                // unpacked, and as a filter before left it; and where the blocks are, in a list that grows by doubling
+                let unpacked = length.saturating_mul(self.filters.len().clamp(1, 2) as u64);
+                store.account.room(wanted.saturating_mul(2 * size_of::<Chunk>() as u64).saturating_add(unpacked))?;
                 let chunks = self.chunks(store, index, extent, length, wanted)?;
                 if chunks.len() as u64 != wanted {
                     return Err(format!("{} of {wanted} blocks of numbers are there", chunks.len()));
                 }
+                let places: BTreeSet<u64> = chunks.iter().map(|chunk| chunk.address).collect();
+                if places.len() < chunks.len() {
+                    return Err("damaged: a block at the address of another".into());
+                }
                 for chunk in chunks {
+                    let passes = length.saturating_mul(self.filters.len() as u64 + 1);
+                    store.account.work(passes.saturating_add(self.steps(length / size)))?;
                     let stored = store.read(chunk.address, chunk.stored)?;
                     let data = filters::undo(&self.filters, chunk.mask, stored, length as usize)?;
                     let at = chunk.origin;
@@ -164,6 +176,12 @@ impl Dataset {
             }
         }
         Ok(())
+    }
+
+    /// Work of handing out so many elements: an eighth of a step for each of their numbers.
+    fn steps(&self, elements: u64) -> u64 {
+        let numbers = if let Datatype::Record { fields, .. } = &self.datatype { fields.len() as u64 } else { 1 };
+        elements.saturating_mul(numbers * STEP / 8)
     }
 
     fn chunks(
@@ -240,8 +258,9 @@ impl Dataset {
         wanted: u64,
         depth: usize,
     ) -> Result<(), String> {
+        let depth = deeper(depth)?;
         let head = store.read(address, 8)?;
-        if !head.starts_with(b"TREE") || head[4] != 1 || depth > DEEPEST {
+        if !head.starts_with(b"TREE") || head[4] != 1 {
             return Err("damaged: no index of blocks".into());
         }
         let (level, count) = (head[5], usize::from(Bytes(&head[6..]).u16()?));
@@ -259,7 +278,7 @@ impl Dataset {
             bytes.take(8)?;
             let address = store.address(bytes)?;
             if level > 0 {
-                self.tree(store, address, chunks, wanted, depth + 1)?;
+                self.tree(store, address, chunks, wanted, depth)?;
             } else if origin.iter().zip(&self.shape).all(|(at, size)| at < size) {
                 chunks.push(Chunk { origin, address, stored, mask });
             }

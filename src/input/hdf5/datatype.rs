@@ -1,9 +1,9 @@
 //! Types of elements: numbers, records of numbers, and short texts.
 
+use super::super::account::deeper;
 use super::super::bytes::Bytes;
 use super::super::number::{Kind, Number};
 
-const DEEPEST: usize = 4;
 const MOST_FIELDS: usize = 1000;
 
 /// Of what a dataset or an attribute consists.
@@ -62,9 +62,7 @@ impl Datatype {
     }
 
     fn nested(bytes: &mut Bytes, depth: usize) -> Result<Datatype, String> {
-        if depth > DEEPEST {
-            return Err("damaged: a type within types without end".into());
-        }
+        let inner = deeper(depth)?;
         let class = bytes.u8()?;
         let flags = bytes.number(3)?;
         let size = bytes.u32()? as usize;
@@ -98,7 +96,7 @@ impl Datatype {
             6 => Self::record(bytes, class >> 4, flags as usize & 0xffff, size, depth),
             // an enumeration, which a boolean is: by its numbers
             8 => {
-                let base = Self::nested(bytes, depth + 1)?;
+                let base = Self::nested(bytes, inner)?;
                 // names and values follow; only the end of a record needs them
                 if depth > 0 {
                     for _ in 0..flags & 0xffff {

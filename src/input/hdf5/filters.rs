@@ -59,8 +59,8 @@ pub(super) fn undo(filters: &[Filter], mask: u32, mut data: Vec<u8>, size: usize
         }
         data = match filter {
             Filter::Deflate => {
-                let mut inflated = Vec::new();
                 let most = size as u64 + 4; // a checksum may still be behind it
+                let mut inflated = Vec::with_capacity(size + 8);
                 let read = ZlibDecoder::new(&data[..]).take(most + 1).read_to_end(&mut inflated);
                 read.map_err(|error| format!("damaged: a compressed block cannot be read: {error}"))?;
                 inflated
@@ -110,7 +110,7 @@ fn fletcher(data: &[u8]) -> u32 {
 
 /// LibLZF: runs of bytes, and copies of earlier ones.
 fn lzf(data: &[u8], most: usize) -> Option<Vec<u8>> {
-    let mut out: Vec<u8> = Vec::new();
+    let mut out: Vec<u8> = Vec::with_capacity(most + 8);
     let mut at = 0;
     while at < data.len() {
         let control = usize::from(data[at]);

@@ -1,13 +1,13 @@
 //! Object headers: the messages that make an object a group or a dataset.
 
+use super::super::account::{LONGEST_NAME, STEP, deeper};
 use super::super::bytes::Bytes;
 use super::chunks::Layout;
 use super::datatype::{Datatype, Element};
 use super::filters::{self, Filter};
-use super::{DEEPEST, MOST_OBJECTS, NOWHERE, Store};
+use super::{MOST_OBJECTS, NOWHERE, Store};
 
-const LONGEST_ATTRIBUTE: u64 = 1 << 16;
-const LONGEST_NAME: usize = 1024;
+const LONGEST_HEAP: u64 = 1 << 16;
 
 /// A dataset as its header describes it.
 #[derive(Clone, Debug)]
@@ -16,6 +16,18 @@ pub(super) struct Dataset {
     pub(super) datatype: Datatype,
     pub(super) layout: Layout,
     pub(super) filters: Vec<Filter>,
+}
+
+impl Dataset {
+    /// Bytes in memory, about.
+    pub(super) fn held(&self) -> u64 {
+        let names = match &self.datatype {
+            Datatype::Record { fields, .. } => fields.iter().map(|(name, ..)| 128 + name.len()).sum(),
+            _ => 0,
+        };
+        let inside = if let Layout::Compact(data) = &self.layout { data.len() } else { 0 };
+        (512 + names + inside + 16 * self.filters.len()) as u64
+    }
 }
 
 /// What an object header says.
@@ -29,6 +41,11 @@ pub(super) struct Object {
 
 /// Kind and content of the messages of a header.
 type Messages = Vec<(u16, Vec<u8>)>;
+
+/// What a header with these messages takes.
+fn held(messages: &Messages) -> u64 {
+    messages.iter().map(|(_, content)| 64 + content.len() as u64).sum()
+}
 
 impl Object {
     pub(super) fn read(store: &mut Store, address: u64) -> Result<Object, String> {
@@ -90,6 +107,7 @@ fn first_version(store: &mut Store, address: u64) -> Result<Messages, String> {
     let mut messages = Vec::new();
     let mut blocks = vec![(address + 16, u64::from(size))];
     while let Some((at, size)) = blocks.pop() {
+        store.account.room(held(&messages).saturating_add(size))?;
         let block = store.read(at, size)?;
         let bytes = &mut Bytes(&block);
         while bytes.0.len() >= 8 {
@@ -116,6 +134,7 @@ fn second_version(store: &mut Store, address: u64) -> Result<Messages, String> {
     let mut blocks = vec![(start + width, size)];
     let mut first = true;
     while let Some((at, size)) = blocks.pop() {
+        store.account.room(held(&messages).saturating_add(size))?;
         let block = store.read(at, size)?;
         let mut bytes = Bytes(&block);
         if !first {
@@ -177,7 +196,9 @@ fn link(store: &Store, bytes: &mut Bytes) -> Result<Option<(String, u64)>, Strin
         bytes.u8()?;
     }
     let length = bytes.number(1 << (flags & 3))?;
-    let name = Bytes::text(bytes.take(usize::try_from(length).map_err(|_| "damaged: a name without end")?)?);
+    let length = usize::try_from(length).map_err(|_| "damaged: a name without end")?;
+    store.account.name(length)?;
+    let name = Bytes::text(bytes.take(length)?);
     Ok(if kind == 0 { Some((name, store.address(bytes)?)) } else { None })
 }
 
@@ -203,7 +224,8 @@ fn symbols(
     links: &mut Vec<(String, u64)>,
     depth: usize,
 ) -> Result<(), String> {
-    if depth > DEEPEST || links.len() > MOST_OBJECTS {
+    let depth = deeper(depth)?;
+    if links.len() > MOST_OBJECTS {
         return Err("more members of a group than a log has".into());
     }
     let (offsets, lengths) = (store.offsets, store.lengths);
@@ -217,7 +239,7 @@ fn symbols(
             for _ in 0..count {
                 store.length(bytes)?;
                 let child = store.address(bytes)?;
-                symbols(store, child, names, links, depth + 1)?;
+                symbols(store, child, names, links, depth)?;
             }
         }
         b"SNOD" => {
@@ -232,7 +254,9 @@ fn symbols(
                 bytes.take(20)?;
                 let name =
                     usize::try_from(name).ok().and_then(|at| names.get(at..)).ok_or("damaged: a name is missing")?;
-                links.push((Bytes::text(&name[..name.len().min(LONGEST_NAME)]), object));
+                let name = Bytes::text(&name[..name.len().min(LONGEST_NAME + 1)]);
+                store.account.name(name.len())?;
+                links.push((name, object));
             }
         }
         _ => return Err("damaged: a group without members".into()),
@@ -250,6 +274,7 @@ fn attribute(store: &mut Store, bytes: &mut Bytes) -> Option<(String, Element)> 
     }
     let stored = |size: usize| if version == 1 { size.div_ceil(8) * 8 } else { size };
     let name = Bytes::text(bytes.take(stored(sizes[0])).ok()?);
+    store.account.work(STEP + name.len() as u64).ok()?;
     let mut datatype = Bytes(bytes.take(stored(sizes[1])).ok()?);
     let mut shape = Bytes(bytes.take(stored(sizes[2])).ok()?);
     if shared {
@@ -265,7 +290,7 @@ fn attribute(store: &mut Store, bytes: &mut Bytes) -> Option<(String, Element)> 
             let (whole, part) = datatype.number(0, value);
             Element::Number(whole as f64 + part)
         }
-        Datatype::Text { .. } => Element::Text(Bytes::text(value)),
+        Datatype::Text { size } if size <= LONGEST_NAME => Element::Text(Bytes::text(value)),
         Datatype::FarText { .. } => Element::Text(far_text(store, &mut Bytes(value)).ok()?),
         _ => return None,
     };
@@ -279,7 +304,7 @@ fn far_text(store: &mut Store, bytes: &mut Bytes) -> Result<String, String> {
     let wanted = bytes.u32()?;
     let head = store.read(heap, 8 + store.lengths as u64)?;
     let size = store.length(&mut Bytes(&head[8..]))?;
-    if !head.starts_with(b"GCOL") || size > LONGEST_ATTRIBUTE {
+    if !head.starts_with(b"GCOL") || size > LONGEST_HEAP {
         return Err("damaged: no text where an attribute says".into());
     }
     let heap = store.read(heap, size)?;
@@ -288,9 +313,9 @@ fn far_text(store: &mut Store, bytes: &mut Bytes) -> Result<String, String> {
     loop {
         let index = u32::from(bytes.u16()?);
         bytes.take(6)?;
-        let size = store.length(bytes)?.min(LONGEST_ATTRIBUTE) as usize;
+        let size = store.length(bytes)?.min(LONGEST_HEAP) as usize;
         if index == wanted {
-            return Ok(Bytes::text(bytes.take(size.min(length as usize))?));
+            return Ok(Bytes::text(bytes.take(size.min(length as usize).min(LONGEST_NAME))?));
         }
         if index == 0 {
             return Err("damaged: a text is missing".into());

@@ -2,11 +2,13 @@
 
 use std::io::{Read, Seek, SeekFrom};
 
+use super::super::account::{Account, Excess, deeper};
 use super::super::number::{Kind, Number};
+use super::MOST_COLUMNS;
+use crate::units::plain;
 
 /// Longer headers are damage or an attack.
 const LONGEST: u64 = 1 << 20;
-const DEEPEST: usize = 8;
 
 /// One field of a structured array, or the only one of a plain array.
 #[derive(Clone, Debug)]
@@ -31,7 +33,7 @@ pub(super) struct Header {
 
 impl Header {
     /// Reads the header of a file of this length.
-    pub(super) fn read(file: &mut (impl Read + Seek), length: u64) -> Result<Header, String> {
+    pub(super) fn read(file: &mut (impl Read + Seek), length: u64, account: &Account) -> Result<Header, String> {
         let cut = |_| "truncated: the header is incomplete".to_string();
         let mut start = [0u8; 8];
         let known = start.len().min(length as usize);
@@ -66,14 +68,18 @@ impl Header {
         } else {
             bytes.iter().map(|b| char::from(*b)).collect() // Latin-1
         };
-        parse(&text, data_start)
+        parse(&text, data_start, account)
     }
 }
 
-fn parse(text: &str, data_start: u64) -> Result<Header, String> {
+fn parse(text: &str, data_start: u64, account: &Account) -> Result<Header, String> {
     let damaged = || "damaged: the header is not the dictionary that NumPy writes".to_string();
-    let mut parser = Parser { rest: text };
-    let Some(Literal::Dict(entries)) = parser.literal(0) else { return Err(damaged()) };
+    let mut parser = Parser { rest: text, account, excess: None };
+    let parsed = parser.literal(0);
+    if let Some(excess) = parser.excess {
+        return Err(excess.into());
+    }
+    let Some(Literal::Dict(entries)) = parsed else { return Err(damaged()) };
     let entry = |key: &str| entries.iter().find(|(k, _)| k == key).map(|(_, v)| v);
     let (Some(descr), Some(Literal::Bool(fortran_order)), Some(Literal::List(shape))) =
         (entry("descr"), entry("fortran_order"), entry("shape"))
@@ -118,11 +124,12 @@ fn parse(text: &str, data_start: u64) -> Result<Header, String> {
                     },
                     Some(_) => return Err(damaged()),
                 };
-                if repeat.is_some_and(|n| n > 1 << 12) {
+                if repeat.is_some_and(|n| n > MOST_COLUMNS as u128) {
                     return Err(format!("field '{name}' holds too many values in one row"));
                 }
                 for i in 0..repeat.unwrap_or(1) {
                     let name = if repeat.is_some() { format!("{name}[{i}]") } else { name.clone() };
+                    account.columns(1, name.len())?;
                     item_size += add_field(&mut fields, item_size, &name, dtype)?;
                 }
             }
@@ -182,6 +189,8 @@ enum Literal {
 
 struct Parser<'a> {
     rest: &'a str,
+    account: &'a Account,
+    excess: Option<Excess>,
 }
 
 impl Parser<'_> {
@@ -200,8 +209,13 @@ impl Parser<'_> {
     fn literal(&mut self, depth: usize) -> Option<Literal> {
         self.rest = self.rest.trim_start();
         let first = self.rest.chars().next()?;
-        if depth > DEEPEST {
-            return None;
+        // with the list that it is in, which grows by doubling
+        match deeper(depth).and_then(|_| self.account.hold(4 * size_of::<Literal>() as u64)) {
+            Ok(()) => {}
+            Err(excess) => {
+                self.excess = Some(excess);
+                return None;
+            }
         }
         match first {
             '\'' | '"' => self.string(first).map(Literal::Str),
@@ -271,7 +285,7 @@ impl Parser<'_> {
                 c if c == quote => {
                     self.rest = &self.rest[i + 1..];
                     // names and types stand in messages of one line
-                    return Some(out.replace(char::is_control, "\u{fffd}"));
+                    return Some(plain(&out).into_owned());
                 }
                 c => out.push(c),
             }

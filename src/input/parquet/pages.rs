@@ -6,12 +6,14 @@ use std::sync::Arc;
 
 use parquet::basic::{Compression, Encoding};
 use parquet::column::page::{Page, PageMetadata, PageReader};
+use parquet::data_type::FixedLenByteArray;
 use parquet::errors::{ParquetError, Result};
 use parquet::file::metadata::ColumnChunkMetaData;
 use parquet::file::reader::{ChunkReader, Length};
 use parquet::file::serialized_reader::SerializedPageReader;
 
 use super::thrift;
+use crate::input::account::{Account, Excess, Loan};
 use crate::input::bytes::zstd;
 
 /// The file of the pages. Reading on at its end is an error here: the crate passes over the elements of a damaged header one by one, as many as
@@ -57,6 +59,15 @@ pub(super) struct Pages {
     /// Bytes that the pages may still have, unpacked.
     left: usize,
     dictionary: bool,
+    account: Account,
+    /// For the dictionary, and for the page that is being read.
+    kept: [Option<Loan>; 2],
+}
+
+impl From<Excess> for ParquetError {
+    fn from(excess: Excess) -> ParquetError {
+        ParquetError::General(excess.to_string())
+    }
 }
 
 fn fault(what: impl Into<String>) -> ParquetError {
@@ -64,7 +75,12 @@ fn fault(what: impl Into<String>) -> ParquetError {
 }
 
 impl Pages {
-    pub(super) fn open(file: &Arc<Disk>, column: &ColumnChunkMetaData, rows: usize) -> Result<Pages> {
+    pub(super) fn open(
+        file: &Arc<Disk>,
+        column: &ColumnChunkMetaData,
+        rows: usize,
+        account: &Account,
+    ) -> Result<Pages> {
         let starts = [column.dictionary_page_offset(), Some(column.data_page_offset())];
         let start = starts.into_iter().flatten().min().unwrap_or(-1);
         let end = start.checked_add(column.compressed_size()).and_then(|end| u64::try_from(end).ok());
@@ -72,8 +88,10 @@ impl Pages {
         let (Some(end), false) = (end, starts.iter().flatten().any(|start| *start < 4)) else {
             return Err(fault("a column lies outside the file"));
         };
-        if thrift::headers_end(&file.0, start as u64, end).is_err() {
-            return Err(fault("the header of a page declares more than there is"));
+        match thrift::headers_end(&file.0, start as u64, end, account) {
+            Ok(()) => {}
+            Err(thrift::Refusal::Endless) => return Err(fault("the header of a page declares more than there is")),
+            Err(thrift::Refusal::Excess(excess)) => return Err(excess.into()),
         }
         let compression = column.compression();
         let left = usize::try_from(column.uncompressed_size()).map_err(|_| fault("a column of negative size"))?;
@@ -84,24 +102,34 @@ impl Pages {
             compression,
             left,
             dictionary: false,
+            account: account.clone(),
+            kept: [None, None],
         })
     }
 
     fn unpack(&mut self, page: Page) -> Result<Page> {
-        let whole = |pages: &mut Pages, bytes: &[u8]| pages.decompress(bytes);
+        let whole = |pages: &mut Pages, bytes: &[u8]| {
+            let out = pages.decompress(bytes)?;
+            pages.account.work((bytes.len() + out.len()) as u64)?;
+            Ok::<_, ParquetError>(out)
+        };
+        self.kept[1] = None;
+        let stored = page.buffer().len();
         let indices = [Encoding::RLE_DICTIONARY, Encoding::PLAIN_DICTIONARY].contains(&page.encoding());
         match page.is_dictionary_page() {
             true => self.dictionary = true,
             false if indices && !self.dictionary => return Err(fault("a page whose dictionary is not there")),
             false => {}
         }
-        Ok(match page {
+        let page = match page {
             Page::DictionaryPage { buf, num_values, encoding, is_sorted } => {
                 let buf = whole(self, &buf)?;
                 // each value has a byte, and room is made for all of them at once
                 if num_values as usize > buf.len() {
                     return Err(fault("a dictionary of fewer bytes than values"));
                 }
+                // unpacked into values of up to so many bytes
+                self.kept[0] = Some(self.account.lend(num_values as u64 * size_of::<FixedLenByteArray>() as u64)?);
                 Page::DictionaryPage { buf: buf.into(), num_values, encoding, is_sorted }
             }
             Page::DataPage { buf, num_values, encoding, def_level_encoding, rep_level_encoding, .. } => {
@@ -137,11 +165,14 @@ impl Pages {
                     statistics: None,
                 }
             }
-        })
+        };
+        self.kept[1] = Some(self.account.lend((stored + page.buffer().len()) as u64)?);
+        Ok(page)
     }
 
     fn decompress(&mut self, bytes: &[u8]) -> Result<Vec<u8>> {
-        let most = self.left;
+        // what is unpacked grows by doubling
+        let most = self.left.min(usize::try_from(self.account.left() / 2).unwrap_or(usize::MAX));
         let read = |reader: &mut dyn Read| {
             let mut out = Vec::new();
             match reader.take(most as u64 + 1).read_to_end(&mut out) {
@@ -153,7 +184,8 @@ impl Pages {
             Compression::UNCOMPRESSED => bytes.to_vec(),
             Compression::SNAPPY => {
                 let size = snap::raw::decompress_len(bytes).map_err(|error| fault(error.to_string()))?;
-                if size > most {
+                self.account.room(size as u64)?;
+                if size > self.left {
                     return Err(fault("a page larger than its column"));
                 }
                 snap::raw::Decoder::new().decompress_vec(bytes).map_err(|error| fault(error.to_string()))?
@@ -176,7 +208,10 @@ impl Pages {
                 )));
             }
         };
-        self.left = most.checked_sub(out.len()).ok_or_else(|| fault("pages larger than their column"))?;
+        if out.len() > most && most < self.left {
+            return Err(Excess::Memory.into());
+        }
+        self.left = self.left.checked_sub(out.len()).ok_or_else(|| fault("pages larger than their column"))?;
         Ok(out)
     }
 }

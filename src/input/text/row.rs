@@ -1,6 +1,7 @@
 //! One line of a text log, field by field: the plain way, which takes every form that is read at all.
 
 use super::super::Rows;
+use super::super::bytes::printable;
 use super::super::sniff::{self, Delimiter};
 
 /// What a column is wanted for.
@@ -97,7 +98,7 @@ impl Form {
                 },
             };
             if !good {
-                let text = String::from_utf8_lossy(&field[..field.len().min(40)]).into_owned();
+                let text = printable(&field[..field.len().min(40)]);
                 return Err(Fault::NoNumber { column: count, text });
             }
             count += 1;

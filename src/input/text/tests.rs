@@ -5,6 +5,7 @@ use super::digits::{Bytes, LEAD, Words};
 use super::fast::{Lines, ROOM, Text};
 use super::row::{Fault, Form, Slot};
 use super::*;
+use crate::input::account::Account;
 use crate::input::sniff::Delimiter;
 use crate::numerics::random::{StreamId, stream};
 use rand::RngExt;
@@ -395,7 +396,7 @@ fn many_bytes_at_once() {
 
 /// What a whole table hands out, and the message with which it ends.
 fn table(path: &Path, chunk: Option<usize>) -> (Read, Option<String>) {
-    let mut table = TextTable::open(path).unwrap();
+    let mut table = TextTable::open(path, &Account::new(u64::MAX)).unwrap();
     table.chunk = chunk;
     table.select(Some(0), &[1, 2], None);
     let (mut rows, mut read) = (Rows::default(), Read::default());

@@ -1,0 +1,1 @@
+//! Standard atmosphere, Dryden turbulence, discrete gusts (floor 1).

@@ -1,0 +1,1 @@
+//! Linear-quadratic regulator, Gramians, controllability (floor 3).

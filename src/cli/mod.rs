@@ -12,6 +12,7 @@ pub mod completions;
 pub mod datasheet;
 pub mod export;
 mod flags;
+pub mod fly;
 pub mod identify;
 pub mod import;
 pub mod inflate;
@@ -64,6 +65,7 @@ enum Command {
     Compare(compare::Args),
     Inflate(inflate::Args),
     Simulate(simulate::Args),
+    Fly(fly::Args),
     Tune(tune::Args),
     Replay(replay::Args),
     Montecarlo(montecarlo::Args),
@@ -98,6 +100,7 @@ pub fn main() -> ExitCode {
         Command::Compare(args) => compare::run(&args),
         Command::Inflate(args) => inflate::run(&args),
         Command::Simulate(args) => simulate::run(&args),
+        Command::Fly(args) => fly::run(&args),
         Command::Tune(args) => tune::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Montecarlo(args) => montecarlo::run(&args),

@@ -3,6 +3,7 @@
 use clap::ValueEnum;
 
 use super::{Status, output};
+use crate::aircraft::flight::{FlightDocument, FlightReport};
 use crate::compare::Comparison;
 use crate::compare::inflation::Inflation;
 use crate::filter::{AttitudeDesign, FilterDesign};
@@ -29,6 +30,10 @@ enum Document {
     Filter,
     /// attitude.json: the filter of the plant attitude
     Attitude,
+    /// flight.json: an airplane, its air and its sensors
+    Flight,
+    /// What `fly --json` prints
+    Fly,
     /// What `info --json` prints
     Info,
     /// What `replay --json` prints
@@ -49,6 +54,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         Document::Filter => FilterDesign::schema(),
         Document::Attitude => AttitudeDesign::schema(),
         Document::AttitudeReplay => schemars::schema_for!(AttitudeReplay).to_value(),
+        Document::Flight => FlightDocument::schema(),
+        Document::Fly => schemars::schema_for!(FlightReport).to_value(),
         Document::Montecarlo => montecarlo::document::schema(),
         Document::Compare => schemars::schema_for!(Comparison).to_value(),
         Document::Inflate => schemars::schema_for!(Inflation).to_value(),

@@ -15,6 +15,7 @@ pub(super) struct Symbol {
 const ANGLE: Dimension = Dimension::new(2, 0, 0);
 const RATE: Dimension = Dimension::new(2, 0, -2);
 const LENGTH: Dimension = Dimension::new(0, 2, 0);
+const VELOCITY: Dimension = Dimension::new(0, 2, -2);
 const FORCE: Dimension = Dimension::new(0, 2, -4);
 const TEMPERATURE: Dimension = Dimension::TEMPERATURE;
 
@@ -37,6 +38,7 @@ const TABLE: &[Row] = &[
     ("rps", 2.0 * PI, RATE, "", &[], &[]),
     ("m", 1.0, LENGTH, "munck", &[], &["metre", "metres", "meter", "meters"]),
     ("ft", 0.3048, LENGTH, "", &[], &["foot", "feet"]),
+    ("kt", 1852.0 / 3600.0, VELOCITY, "", &["kn"], &["knot", "knots"]),
     ("g", STANDARD_GRAVITY, FORCE, "mun", &["gee"], &[]),
     ("Gal", 0.01, FORCE, "mu", &[], &[]),
     ("s", 1.0, Dimension::TIME, "mun", &[], &["sec", "secs", "second", "seconds"]),

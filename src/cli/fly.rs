@@ -87,7 +87,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         Ok(Log { path, writer })
     };
     let report = fly(&plan, args.seed, args.runs, open)?;
-    if args.json { print_json(&report)? } else { print_text(&text(&report))? }
+    if args.json {
+        print_json(&report)?
+    } else {
+        print_text(&text(&report))?
+    }
     Ok(Status::Done)
 }
 

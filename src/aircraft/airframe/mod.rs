@@ -1,46 +1,99 @@
-//! STUB
-use crate::aircraft::atmosphere::standard;
-#[derive(Clone, Copy, Debug)]
-pub struct AirState { pub velocity: [f64; 3], pub rate: [f64; 3] }
-#[derive(Clone, Copy, Debug)]
-pub struct Controls { pub elevator: f64, pub aileron: f64, pub rudder: f64, pub throttle: f64 }
-#[derive(Clone, Copy, Debug)]
-pub struct Wrench { pub force: [f64; 3], pub moment: [f64; 3] }
-#[derive(Clone, Copy, Debug)]
-pub struct Inertia { pub xx: f64, pub yy: f64, pub zz: f64, pub xz: f64 }
-#[derive(Clone, Copy, Debug)]
-pub struct ReferenceSize { pub area: f64, pub span: f64, pub chord: f64 }
-#[derive(Clone, Debug)]
-pub struct Airplane { pub name: String, pub mass: f64, pub inertia: Inertia, pub reference: ReferenceSize }
+//! The `airplane.json` document, aerodynamics, propulsion and trim (floor 2).
+//!
+//! [`Airplane`] is an airplane in SI; what it feels in moving air is [`Airplane::forces`], a pure function of the state of the air, the controls and the
+//! density.
+
+mod aerodynamics;
+mod document;
+mod propulsion;
+pub mod trim;
+
+pub use aerodynamics::{Aerodynamics, Drag, Lateral, Lift, Pitch, Stall};
+pub use document::AirplaneDocument;
+pub use propulsion::{Curve, Motor, Propulsion, Running};
+
+/// Velocity (m/s) and rate (rad/s) against the air, body axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AirState {
+    pub velocity: [f64; 3],
+    pub rate: [f64; 3],
+}
+
+/// Where surfaces (rad) and throttle stand. An airplane whose propulsion is a thrust has it, in N, in place of the throttle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Controls {
+    pub elevator: f64,
+    pub aileron: f64,
+    pub rudder: f64,
+    pub throttle: f64,
+}
+
+/// Force (N) and moment about the centre of gravity (N m), body axes, gravity left out.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wrench {
+    pub force: [f64; 3],
+    pub moment: [f64; 3],
+}
+
+/// Moments of inertia about the centre of gravity, kg m². `xz` is the integral ∫xz dm, so that the matrix is [xx 0 −xz; 0 yy 0; −xz 0 zz].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Inertia {
+    pub xx: f64,
+    pub yy: f64,
+    pub zz: f64,
+    pub xz: f64,
+}
+
+/// Wing area (m²), span and mean chord (m).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Size {
+    pub area: f64,
+    pub span: f64,
+    pub chord: f64,
+}
+
+/// A servo of second order; angles in rad.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Actuator {
+    /// rad/s.
+    pub frequency: f64,
+    pub damping: f64,
+    /// Stops, lower and upper.
+    pub travel: [f64; 2],
+    /// rad/s; infinite for none.
+    pub rate_limit: f64,
+    /// From the command to the servo, s.
+    pub delay: f64,
+}
+
+/// An airplane in SI.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Airplane {
+    pub name: String,
+    pub mass: f64,
+    pub inertia: Inertia,
+    pub size: Size,
+    pub aerodynamics: Aerodynamics,
+    pub propulsion: Propulsion,
+    /// Of elevator, aileron, rudder; a surface without one stands where it is told at once.
+    pub actuators: [Option<Actuator>; 3],
+    /// Where sensors are, from the centre of gravity in body axes, m, by name.
+    pub positions: Vec<(String, [f64; 3])>,
+}
+
 impl Airplane {
-    pub fn aerosonde() -> Airplane {
-        let _ = standard::GRAVITY;
-        Airplane { name: "Aerosonde".into(), mass: 11.0, inertia: Inertia { xx: 0.8244, yy: 1.135, zz: 1.759, xz: 0.1204 }, reference: ReferenceSize { area: 0.55, span: 2.8956, chord: 0.18994 } }
+    /// What it feels in air of a density (kg/m³).
+    pub fn forces(&self, air: &AirState, controls: &Controls, density: f64) -> Wrench {
+        let mut wrench = self.aerodynamics.forces(&self.size, air, controls, density);
+        let [u, v, w] = air.velocity;
+        let running = self.propulsion.running(controls.throttle, (u * u + v * v + w * w).sqrt(), density);
+        wrench.force[0] += running.thrust;
+        wrench.moment[0] -= running.reaction;
+        wrench
     }
-    pub fn forces(&self, air: &AirState, k: &Controls, rho: f64) -> Wrench {
-        let [u, v, w] = air.velocity; let [p, q, r] = air.rate;
-        let speed = (u*u+v*v+w*w).sqrt(); let al = w.atan2(u); let be = (v/speed).asin();
-        let (s, b, c) = (0.55, 2.8956, 0.18994);
-        let (ph, qh, rh) = (b*p/2.0/speed, c*q/2.0/speed, b*r/2.0/speed);
-        let qs = 0.5*rho*speed*speed*s;
-        let (m, a0) = (50.0, 0.47);
-        let e1 = (-m*(al-a0) as f64).exp(); let e2 = (m*(al+a0) as f64).exp();
-        let sg = (1.0+e1+e2)/((1.0+e1)*(1.0+e2));
-        let lin = 0.23+5.61*al;
-        let cl = (1.0-sg)*lin + sg*2.0*al.signum()*al.sin().powi(2)*al.cos() + 7.95*qh + 0.13*k.elevator;
-        let cd = 0.043 + lin*lin/(std::f64::consts::PI*0.9*b*b/s);
-        let cy = -0.98*be + 0.075*k.aileron + 0.19*k.rudder;
-        let cll = -0.13*be -0.51*ph + 0.25*rh + 0.17*k.aileron + 0.0024*k.rudder;
-        let cm = 0.0135 - 2.74*al - 38.21*qh - 0.99*k.elevator;
-        let cn = 0.073*be - 0.069*ph - 0.095*rh - 0.011*k.aileron - 0.069*k.rudder;
-        let tau = std::f64::consts::TAU; let d: f64 = 0.508; let kv = 60.0/(tau*145.0); let rr = 0.042; let vin = 44.4*k.throttle;
-        let a = 0.005230*rho*d.powi(5)/(tau*tau);
-        let bb = 0.004970*rho*d.powi(4)*speed/tau + kv*kv/rr;
-        let cc = -0.01664*rho*d.powi(3)*speed*speed - kv*vin/rr + kv*1.5;
-        let om = (-bb + (bb*bb-4.0*a*cc).sqrt())/(2.0*a);
-        let n = om/tau; let j = speed/(n*d);
-        let t = rho*n*n*d.powi(4)*(0.09357-0.06044*j-0.1079*j*j);
-        let tq = rho*n*n*d.powi(5)*(0.005230+0.004970*j-0.01664*j*j);
-        Wrench { force: [qs*(cl*al.sin()-cd*al.cos())+t, qs*cy, qs*(-cl*al.cos()-cd*al.sin())], moment: [qs*b*cll - tq, qs*c*cm, qs*b*cn] }
+
+    /// Where a sensor is; at the centre of gravity when the document does not say.
+    pub fn position(&self, sensor: &str) -> [f64; 3] {
+        self.positions.iter().find(|(name, _)| name == sensor).map_or([0.0; 3], |(_, at)| *at)
     }
 }

@@ -167,8 +167,7 @@ impl Dryden {
         let [su, sv, sw] = self.std_devs;
         let one = |t: f64| 1.0 + (t * omega).powi(2);
         let u = su * su * 2.0 * tu / (PI * one(tu));
-        let transverse =
-            |s: f64, t: f64| s * s * t / PI * (1.0 + 3.0 * (t * omega).powi(2)) / (one(t) * one(t));
+        let transverse = |s: f64, t: f64| s * s * t / PI * (1.0 + 3.0 * (t * omega).powi(2)) / (one(t) * one(t));
         let (v, w) = (transverse(sv, tv), transverse(sw, tw));
         let [tp, tq, tr] = self.span_times();
         let slope = (omega / self.airspeed).powi(2);

@@ -84,7 +84,8 @@ fn table(path: &Path) -> Result<Table, FlightError> {
     let fail = |what: String| FlightError(format!("{shown}: {what}"));
     let text = std::fs::read_to_string(path).map_err(|e| fail(format!("cannot read: {e}")))?;
     let mut lines = (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty());
-    let (_, header) = lines.next().ok_or_else(|| fail("empty; expected a header, time (s),elevator (deg), and rows".into()))?;
+    let (_, header) =
+        lines.next().ok_or_else(|| fail("empty; expected a header, time (s),elevator (deg), and rows".into()))?;
     let mut time = None;
     let mut columns = [None; CONTROLS];
     let mut scales = Vec::new();
@@ -124,7 +125,10 @@ fn table(path: &Path) -> Result<Table, FlightError> {
         }
         let values: Vec<f64> = values.iter().zip(&scales).map(|(x, scale)| x * scale).collect();
         if let Some((before, _)) = rows.last().filter(|(before, _)| *before >= values[time]) {
-            return Err(fail(format!("line {number}: time goes from {before} s to {} s; expected it to rise", values[time])));
+            return Err(fail(format!(
+                "line {number}: time goes from {before} s to {} s; expected it to rise",
+                values[time]
+            )));
         }
         rows.push((values[time], values));
     }

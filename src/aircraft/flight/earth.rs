@@ -1,6 +1,6 @@
 //! The two earths: flat at rest, and the rotating WGS84 ellipsoid with gravitation to J2.
 
-use super::vector::{Matrix, Vector, back, matrix, times, transpose};
+use super::vector::{Matrix, Vector, back, matrix, product, quaternion, transpose};
 use crate::aircraft::atmosphere::standard::GRAVITY;
 
 /// WGS84 (NIMA TR8350.2, 2000): semi-major axis, flattening, GM, J2, rate.
@@ -118,7 +118,7 @@ impl Earth {
     pub(super) fn body_to_local(self, r: Vector, attitude: [f64; 4]) -> Matrix {
         match self {
             Earth::Flat => matrix(attitude),
-            Earth::Wgs84 => super::vector::product(&self.local(r), &matrix(attitude)),
+            Earth::Wgs84 => product(&self.local(r), &matrix(attitude)),
         }
     }
 
@@ -127,14 +127,9 @@ impl Earth {
         back(&self.local(r), v)
     }
 
-    /// North, east, down of a vector from a place `origin` to `r`, in the axes there.
-    pub(super) fn way(self, origin: Vector, r: Vector) -> Vector {
-        times(&self.local(origin), super::vector::minus(r, origin))
-    }
-
     /// Quaternion of body against the axes of the position from a body to local matrix.
     pub(super) fn attitude(self, r: Vector, body_to_local: &Matrix) -> [f64; 4] {
-        let c = super::vector::product(&transpose(&self.local(r)), body_to_local);
-        super::vector::quaternion(&c)
+        let c = product(&transpose(&self.local(r)), body_to_local);
+        quaternion(&c)
     }
 }

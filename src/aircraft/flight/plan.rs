@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::FlightError;
 use super::autopilot::{Gains, Reference};
 use super::commands::{self, Commands};
 use super::document::{EarthEntry, FlightDocument, GustEntry, WindEntry};
@@ -11,7 +12,6 @@ use super::sensors::{Errors, three_axes};
 use super::start::{self, Start};
 use super::surfaces::CONTROLS;
 use super::vector::{Vector, back, dot, matrix, minus, times};
-use super::FlightError;
 use crate::aircraft::airframe::Airplane;
 use crate::aircraft::atmosphere::discrete::DiscreteGust;
 use crate::aircraft::atmosphere::dryden::{Dryden, Intensity};
@@ -49,10 +49,6 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    pub(super) fn interval(&self) -> f64 {
-        1.0 / self.rate
-    }
-
     pub(super) fn step(&self) -> f64 {
         1.0 / (self.rate * self.steps as f64)
     }
@@ -115,21 +111,21 @@ impl Plan {
             EarthEntry::Flat => Earth::Flat,
             EarthEntry::Wgs84(_) => Earth::Wgs84,
         };
-        let wind = document
-            .wind
-            .as_ref()
-            .map_or([0.0; 3], |WindEntry { north, east, down }| [north, east, down].map(si));
+        let wind =
+            document.wind.as_ref().map_or([0.0; 3], |WindEntry { north, east, down }| [north, east, down].map(si));
         let Start { state, controls, reference, altitude } = start::start(document, &airplane, earth, wind)?;
         standard::at(altitude).map_err(|e| at("altitude")(e.to_string()))?;
         let world = World::new(&airplane, earth, wind);
         let airspeed = airspeed(&world, &state);
-        let (dryden, discrete) = gusts(document, altitude, airspeed, airplane.reference.span)?;
+        let (dryden, discrete) = gusts(document, altitude, airspeed, airplane.size.span)?;
         let sensors = &document.sensors;
         let read = |key: &str, linked: &Option<super::document::Linked>, quantity: Quantity, what: &str| {
             let key = format!("sensors.{key}");
             let Some(linked) = linked else { return Ok(None) };
             let (params, shown) = linked.params(&key, folder).map_err(FlightError)?;
-            three_axes(params, quantity.dimension(), what).map(Some).map_err(|e| FlightError(format!("{key}: {shown}: {e}")))
+            three_axes(params, quantity.dimension(), what)
+                .map(Some)
+                .map_err(|e| FlightError(format!("{key}: {shown}: {e}")))
         };
         let gyro = read("gyro", &sensors.gyro, Quantity::AngularRate, "a gyro")?;
         let accelerometer = read("accelerometer", &sensors.accelerometer, Quantity::SpecificForce, "an accelerometer")?;
@@ -155,11 +151,18 @@ impl Plan {
             gnss_velocity: errors("gnss.velocity", &gnss.and_then(|g| g.velocity.clone()), own)?,
             gyro,
             accelerometer,
-            accelerometer_position: start::position_of(&airplane, "accelerometer"),
-            gnss_antenna: start::position_of(&airplane, "gnss"),
+            accelerometer_position: airplane.position("accelerometer"),
+            gnss_antenna: airplane.position("gnss"),
         };
-        let autopilot = autopilot(document, reference, &grid, sensors.attitude.is_some())?;
         let commands = commands::read(&document.controls, folder, controls, times.duration)?;
+        let [elevator, aileron, rudder, _] = commands.fixed;
+        let reference = Reference { surfaces: [elevator, aileron, rudder], ..reference };
+        let autopilot = autopilot(document, reference, &grid, sensors.attitude.is_some())?;
+        if autopilot.is_some() && commands.rows.iter().any(|(_, row)| row[..3] != commands.fixed[..3]) {
+            return Err(FlightError(
+                "controls.file: moves a surface that the autopilot moves; leave one of them out".into(),
+            ));
+        }
         start::check_travel(&airplane, &commands)?;
         let plan = Plan { airplane, earth, wind, start: state, commands, dryden, discrete, sensors, autopilot, grid };
         plan.check_step()?;
@@ -232,13 +235,17 @@ fn whole(number: f64) -> Option<u64> {
 /// `given`: samples per second that sensors or the autopilot ask for.
 fn grid(times: &Times, given: Option<f64>) -> Result<Grid, FlightError> {
     let positive = |name: &str, time: f64| {
-        if time.is_finite() && time > 0.0 { Ok(()) } else { Err(FlightError(format!("{name} {time} s: expected a positive time"))) }
+        if time.is_finite() && time > 0.0 {
+            Ok(())
+        } else {
+            Err(FlightError(format!("{name} {time} s: expected a positive time")))
+        }
     };
     positive("duration", times.duration)?;
     times.every.map_or(Ok(()), |every| positive("every", every))?;
     times.step.map_or(Ok(()), |step| positive("step", step))?;
     // without sensors the rows alone ask for samples
-    let free = times.every.filter(|every| whole(every * RATE).is_none()).map_or(RATE, |every| 1.0 / every);
+    let free = times.every.filter(|every| whole(times.duration / every).is_some()).map_or(RATE, |every| 1.0 / every);
     let rate = given.unwrap_or(free);
     let Some(samples) = whole(times.duration * rate) else {
         return Err(FlightError(format!(

@@ -4,9 +4,9 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::FlightError;
 use super::plan::Plan;
 use super::rows::{self, Row};
-use super::FlightError;
 use crate::numerics::reduce::Moments;
 
 /// What `fly` says of its runs; the rows themselves are in the logs.
@@ -77,7 +77,12 @@ impl Plan {
 
 /// Flies runs 0 … `runs` − 1 on all threads; `open` gives the place for the rows of a run. Memory does not grow with the length of a flight. Errors: the
 /// first run that fails, in the order of runs.
-pub fn fly<E, S>(plan: &Plan, seed: u64, runs: u64, open: impl Fn(u64) -> Result<S, E> + Sync) -> Result<FlightReport, E>
+pub fn fly<E, S>(
+    plan: &Plan,
+    seed: u64,
+    runs: u64,
+    open: impl Fn(u64) -> Result<S, E> + Sync,
+) -> Result<FlightReport, E>
 where
     E: From<FlightError> + Send,
     S: RowSink<E>,
@@ -107,7 +112,8 @@ struct Figures {
 
 fn one<E: From<FlightError>, S: RowSink<E>>(plan: &Plan, seed: u64, run: u64, mut sink: S) -> Result<RunReport, E> {
     let names = plan.columns();
-    let new = Figures { moments: Moments::default(), least: f64::INFINITY, greatest: f64::NEG_INFINITY, last: f64::NAN };
+    let new =
+        Figures { moments: Moments::default(), least: f64::INFINITY, greatest: f64::NEG_INFINITY, last: f64::NAN };
     let mut figures = vec![new; names.len()];
     let mut block: Vec<Vec<f64>> = vec![Vec::with_capacity(BLOCK); names.len()];
     let mut count = 0;

@@ -161,7 +161,8 @@ pub(super) fn header(plan: &Plan) -> Vec<String> {
         [("gyro", "rad/s", sensors.gyro.is_some()), ("accel", "m/s^2", sensors.accelerometer.is_some())]
     {
         if there {
-            let of = |axis: &str| ["rate", "bias", "drift"].map(|what| format!("truth_{sensor}_{axis}_{what} ({unit})"));
+            let of =
+                |axis: &str| ["rate", "bias", "drift"].map(|what| format!("truth_{sensor}_{axis}_{what} ({unit})"));
             names.extend(AXES.iter().flat_map(|axis| of(axis)));
         }
     }

@@ -6,8 +6,8 @@ use super::autopilot::Autopilot;
 use super::motion::{Instant, State, World, attitude, step};
 use super::plan::Plan;
 use super::rows::{Measurements, Row};
-use super::surfaces::{SAME_TIME, Surface, Surfaces};
 use super::start::servo_of;
+use super::surfaces::{SAME_TIME, Surface, Surfaces};
 use super::vector::to_euler;
 use crate::aircraft::airframe::Controls;
 use crate::aircraft::atmosphere::{AirError, Gust};
@@ -40,9 +40,9 @@ impl Plan {
         let mut flying = Flying::new(self, seed, run)?;
         let mut measurements = Measurements::new(self, seed, run)?;
         let euler = flying.euler();
-        let mut autopilot = self
-            .autopilot
-            .map(|a| Autopilot::new(a.gains, a.reference, a.every as f64 / self.grid.rate, a.filter, [euler[0], euler[1]]));
+        let mut autopilot = self.autopilot.map(|a| {
+            Autopilot::new(a.gains, a.reference, a.every as f64 / self.grid.rate, a.filter, [euler[0], euler[1]])
+        });
         for sample in 0..=self.grid.samples {
             let time = sample as f64 / self.grid.rate;
             flying.surfaces.receive(time);
@@ -155,7 +155,10 @@ impl<'a> Flying<'a> {
         let start = sample as f64 / grid.rate;
         let end = (sample + 1) as f64 / grid.rate;
         while let Some((time, row)) = self.plan.commands.rows.get(self.next_command).filter(|(time, _)| *time <= end) {
-            self.surfaces.0.iter_mut().zip(row).for_each(|(surface, command)| surface.order(*time, *command));
+            // the autopilot moves the surfaces, the file then the throttle
+            let moved = if self.plan.autopilot.is_some() { 3 } else { 0 };
+            let controls = self.surfaces.0.iter_mut().zip(row).skip(moved);
+            controls.for_each(|(surface, command)| surface.order(*time, *command));
             self.next_command += 1;
         }
         for i in 0..grid.steps {

@@ -50,9 +50,9 @@ impl Channel {
     pub(super) fn new(errors: Errors, rate: f64, address: (u64, u64, u32)) -> Channel {
         let [white, drift] = streams::measurement(address.0, address.1, address.2);
         let interval = errors.every as f64 / rate;
-        let drift = errors
-            .drift
-            .map(|(std_dev, correlation_time)| Term::GaussMarkov { std_dev, correlation_time }.sample_path(interval, drift));
+        let drift = errors.drift.map(|(std_dev, correlation_time)| {
+            Term::GaussMarkov { std_dev, correlation_time }.sample_path(interval, drift)
+        });
         Channel { errors, white, drift }
     }
 

@@ -60,7 +60,13 @@ impl Servo {
     fn regime(&self, state: &mut ServoState, command: f64, dt: f64) -> f64 {
         let [lowest, highest] = self.travel;
         let acceleration = self.acceleration(*state, command);
-        let outward = if state.angle >= highest { 1.0 } else if state.angle <= lowest { -1.0 } else { 0.0 };
+        let outward = if state.angle >= highest {
+            1.0
+        } else if state.angle <= lowest {
+            -1.0
+        } else {
+            0.0
+        };
         if outward != 0.0 && (outward * state.rate > 0.0 || (state.rate == 0.0 && outward * acceleration >= 0.0)) {
             *state = ServoState { angle: state.angle.clamp(lowest, highest), rate: 0.0 };
             if outward * self.acceleration(*state, command) >= 0.0 {
@@ -115,7 +121,9 @@ impl Servo {
             let first = [&rate as &dyn Fn(f64) -> f64, &above, &below]
                 .into_iter()
                 .enumerate()
-                .filter_map(|(limit, f)| (f(to) > 0.0).then(|| (if f(from) >= 0.0 { from } else { root(f, from, to).unwrap_or(to) }, limit)))
+                .filter_map(|(limit, f)| {
+                    (f(to) > 0.0).then(|| (if f(from) >= 0.0 { from } else { root(f, from, to).unwrap_or(to) }, limit))
+                })
                 .min_by(|a, b| a.0.total_cmp(&b.0));
             if let Some((t, limit)) = first {
                 *state = at(t);

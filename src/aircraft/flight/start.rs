@@ -5,13 +5,14 @@ use std::path::Path;
 use super::FlightError;
 use super::autopilot::Reference;
 use super::commands::{Commands, NAMES};
-use super::document::{EarthEntry, FlightDocument};
+use super::document::{EarthEntry, FlightDocument, TrimEntry};
 use super::earth::{Earth, Geodetic};
 use super::motion::State;
 use super::servo::Servo;
 use super::surfaces::CONTROLS;
 use super::vector::{Vector, back, from_euler, plus};
-use crate::aircraft::airframe::Airplane;
+use crate::aircraft::airframe::trim::{Sideways, Trim, TrimRequest, Turn};
+use crate::aircraft::airframe::{Actuator, Airplane, Propulsion};
 use crate::params::Measured;
 
 /// Where a flight begins.
@@ -25,23 +26,42 @@ pub(super) struct Start {
     pub altitude: f64,
 }
 
-pub(super) fn airplane(_document: &FlightDocument, _folder: &Path) -> Result<Airplane, FlightError> {
-    Ok(Airplane::aerosonde())
+/// The airplane that the document names. Errors: its own, with the place.
+pub(super) fn airplane(document: &FlightDocument, folder: &Path) -> Result<Airplane, FlightError> {
+    let (text, shown) = document.airplane.text("airplane", folder).map_err(|e| FlightError(e.to_string()))?;
+    Airplane::from_json(&text, &shown).map_err(|e| FlightError(e.to_string()))
 }
 
-/// Servo and delay of a control.
+/// Servo and delay of a control; the throttle has none.
 pub(super) fn servo_of(airplane: &Airplane, control: usize) -> (Option<Servo>, f64) {
-    let _ = airplane;
-    if control == 3 { return (None, 0.0) }
-    (Some(Servo { frequency: 50.0, damping: 0.7, travel: [-0.436, 0.436], rate_limit: 5.235987755982989 }), 0.0)
+    let Some(Some(Actuator { frequency, damping, travel, rate_limit, delay })) = airplane.actuators.get(control) else {
+        return (None, 0.0);
+    };
+    (Some(Servo { frequency: *frequency, damping: *damping, travel: *travel, rate_limit: *rate_limit }), *delay)
 }
 
-pub(super) fn position_of(_airplane: &Airplane, _sensor: &str) -> Vector {
-    [0.0; 3]
+pub(super) fn throttle_column(airplane: &Airplane) -> &'static str {
+    match airplane.propulsion {
+        Propulsion::Motor(_) => "throttle",
+        Propulsion::Thrust { .. } => "thrust (N)",
+    }
 }
 
-pub(super) fn throttle_column(_airplane: &Airplane) -> &'static str {
-    "throttle"
+/// The steady flight that the document asks for.
+pub(super) fn trim(entry: &TrimEntry, airplane: &Airplane) -> Result<Trim, FlightError> {
+    let si = |m: &Option<Measured>| m.as_ref().map_or(0.0, Measured::si);
+    let request = TrimRequest {
+        airspeed: entry.airspeed.si(),
+        altitude: entry.altitude.si(),
+        climb: si(&entry.climb),
+        turn: entry.bank.as_ref().map_or(Turn::Rate(si(&entry.turn_rate)), |bank| Turn::Bank(bank.si())),
+        sideways: match entry.lateral.as_deref() {
+            Some("zero_side_force") => Sideways::ZeroSideForce,
+            Some("wings_level") => Sideways::WingsLevel,
+            _ => Sideways::ZeroSideslip,
+        },
+    };
+    airplane.trim(&request).map_err(|e| FlightError(format!("trim: {e}")))
 }
 
 /// Fixed commands and rows stay within the stops. Errors: the first that does not.
@@ -65,7 +85,7 @@ pub(super) fn check_travel(airplane: &Airplane, commands: &Commands) -> Result<(
 
 pub(super) fn start(
     document: &FlightDocument,
-    _airplane: &Airplane,
+    airplane: &Airplane,
     earth: Earth,
     wind: Vector,
 ) -> Result<Start, FlightError> {
@@ -79,14 +99,13 @@ pub(super) fn start(
     let mut altitude = None;
     euler[2] = of_earth[2].unwrap_or(0.0);
     if let Some(trim) = &document.trim {
-        // level at 25 m/s of the sheet
         altitude = Some(trim.altitude.si());
-        let (alpha, phi, theta) = (0.053873983_f64, -0.000530560, 0.053873975);
-        velocity = [trim.airspeed.si() * alpha.cos(), 0.0, trim.airspeed.si() * alpha.sin()];
-        euler = [phi, theta, euler[2]];
-        controls = Some([-0.135469407, 0.006129659, -0.000977192, 0.777789841]);
+        let found = self::trim(trim, airplane)?;
+        (velocity, rate) = (found.velocity, found.rate);
+        euler = [found.phi, found.theta, euler[2]];
+        let c = found.controls;
+        controls = Some([c.elevator, c.aileron, c.rudder, c.throttle]);
         velocity = plus(velocity, back(&from_euler(euler), wind));
-        rate = [0.0; 3];
     }
     let mut place = [of_earth[0], of_earth[1]];
     if let Some(i) = &document.initial {
@@ -110,7 +129,6 @@ pub(super) fn start(
         return Err(FlightError("trim: missing; give a trim or an initial state to start from".into()));
     }
     let state = super::plan::state(earth, Geodetic { latitude, longitude, height }, euler, velocity, rate);
-    let reference =
-        Reference { rate, angles: [euler[0], euler[1]], surfaces: controls.map_or([0.0; 3], |c| [c[0], c[1], c[2]]) };
+    let reference = Reference { rate, angles: [euler[0], euler[1]], surfaces: [0.0; 3] };
     Ok(Start { state, controls, reference, altitude: height })
 }

@@ -53,7 +53,8 @@ pub(super) fn matrix(e: [f64; 4]) -> Matrix {
 /// The quaternion of a rotation matrix, by its largest component.
 pub(super) fn quaternion(c: &Matrix) -> [f64; 4] {
     let trace = c[0][0] + c[1][1] + c[2][2];
-    let squares = [trace, 2.0 * c[0][0] - trace, 2.0 * c[1][1] - trace, 2.0 * c[2][2] - trace].map(|x| 0.25 * (1.0 + x));
+    let squares =
+        [trace, 2.0 * c[0][0] - trace, 2.0 * c[1][1] - trace, 2.0 * c[2][2] - trace].map(|x| 0.25 * (1.0 + x));
     let largest = (0..4).max_by(|&i, &j| squares[i].total_cmp(&squares[j])).unwrap_or(0);
     let root = squares[largest].sqrt();
     let f = 0.25 / root;

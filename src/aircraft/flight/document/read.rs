@@ -58,7 +58,17 @@ fn word<'a>(place: &Place<'a>, known: &[&str]) -> Result<&'a str, KeyError> {
 
 pub(super) fn flight(place: &Place<'_>) -> Result<FlightDocument, KeyError> {
     let known = [
-        "format", "airplane", "trim", "initial", "controls", "earth", "wind", "gusts", "sensors", "autopilot", "feeds",
+        "format",
+        "airplane",
+        "trim",
+        "initial",
+        "controls",
+        "earth",
+        "wind",
+        "gusts",
+        "sensors",
+        "autopilot",
+        "feeds",
         "criteria",
     ];
     let o = place.document(FORMAT, "flight.json", &known)?;
@@ -81,7 +91,8 @@ pub(super) fn flight(place: &Place<'_>) -> Result<FlightDocument, KeyError> {
 
 fn trim(place: &Place<'_>) -> Result<TrimEntry, KeyError> {
     let o = place.object(&["airspeed", "altitude", "climb", "turn_rate", "bank", "lateral"])?;
-    let altitude = o.required("altitude").map_err(|e| KeyError { message: "missing; for example \"100 m\"".into(), ..e })?;
+    let altitude =
+        o.required("altitude").map_err(|e| KeyError { message: "missing; for example \"100 m\"".into(), ..e })?;
     let entry = TrimEntry {
         airspeed: required(&o, "airspeed", VELOCITY)?,
         altitude: Measured::from_place(&altitude, LENGTH, Range::Any)?,
@@ -97,8 +108,7 @@ fn trim(place: &Place<'_>) -> Result<TrimEntry, KeyError> {
 }
 
 fn initial(place: &Place<'_>) -> Result<InitialEntry, KeyError> {
-    let known =
-        ["u", "v", "w", "phi", "theta", "psi", "p", "q", "r", "altitude", "latitude", "longitude"];
+    let known = ["u", "v", "w", "phi", "theta", "psi", "p", "q", "r", "altitude", "latitude", "longitude"];
     let o = place.object(&known)?;
     let get = |key: &str, dimension| value(&o, key, dimension, Range::Any);
     Ok(InitialEntry {
@@ -129,7 +139,7 @@ fn controls(place: &Place<'_>) -> Result<ControlsEntry, KeyError> {
         aileron: angle("aileron")?,
         rudder: angle("rudder")?,
         throttle: throttle.as_ref().map(plain).transpose()?,
-        thrust: None,
+        thrust: value(&o, "thrust", Dimension::FORCE, Range::Any)?,
         file: o.optional("file").map(|p| p.text().map(PathBuf::from)).transpose()?,
     };
     if let (Some(place), Some(throttle)) = (&throttle, entry.throttle)
@@ -170,7 +180,17 @@ fn wind(place: &Place<'_>) -> Result<WindEntry, KeyError> {
 
 fn gust(place: &Place<'_>) -> Result<GustEntry, KeyError> {
     let known = [
-        "model", "specification", "wind_at_20ft", "std_dev", "height", "airspeed", "form", "length", "u", "v", "w",
+        "model",
+        "specification",
+        "wind_at_20ft",
+        "std_dev",
+        "height",
+        "airspeed",
+        "form",
+        "length",
+        "u",
+        "v",
+        "w",
         "start",
     ];
     let model = word(&place.object(&known)?.required("model")?, &["dryden", "1-cos"])?;
@@ -275,9 +295,9 @@ fn samples(place: &Place<'_>) -> Result<u64, KeyError> {
     let mut words = text.split_whitespace();
     let count = words.next().and_then(|word| word.parse().ok());
     let unit = words.next().is_none_or(|word| matches!(word, "sample" | "samples"));
-    count
-        .filter(|_| unit && words.next().is_none())
-        .ok_or_else(|| place.error(format!("expected a whole number of samples, for example \"1 sample\", found \"{text}\"")))
+    count.filter(|_| unit && words.next().is_none()).ok_or_else(|| {
+        place.error(format!("expected a whole number of samples, for example \"1 sample\", found \"{text}\""))
+    })
 }
 
 fn gains(place: &Place<'_>) -> Result<GainsEntry, KeyError> {

@@ -1,0 +1,6 @@
+//! The airplane: its air, its motion, what it measures. Numbers named "the sheet's" come from a second implementation of the same equations.
+
+mod atmosphere;
+mod fly;
+mod servo;
+mod turbulence;

@@ -3,4 +3,5 @@
 mod atmosphere;
 mod fly;
 mod servo;
+mod steady;
 mod turbulence;

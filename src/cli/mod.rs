@@ -5,6 +5,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "the command line is the one place that prints")]
 
 mod aid_columns;
+pub mod airplane;
 pub mod allan;
 mod allan_figure;
 pub mod compare;
@@ -27,6 +28,7 @@ pub mod schema;
 pub mod simulate;
 mod stretch;
 mod tests_table;
+pub mod trim;
 pub mod tune;
 mod windows;
 
@@ -65,6 +67,8 @@ enum Command {
     Compare(compare::Args),
     Inflate(inflate::Args),
     Simulate(simulate::Args),
+    Airplane(airplane::Args),
+    Trim(trim::Args),
     Fly(fly::Args),
     Tune(tune::Args),
     Replay(replay::Args),
@@ -100,6 +104,8 @@ pub fn main() -> ExitCode {
         Command::Compare(args) => compare::run(&args),
         Command::Inflate(args) => inflate::run(&args),
         Command::Simulate(args) => simulate::run(&args),
+        Command::Airplane(args) => airplane::run(&args),
+        Command::Trim(args) => trim::run(&args),
         Command::Fly(args) => fly::run(&args),
         Command::Tune(args) => tune::run(&args),
         Command::Replay(args) => replay::run(&args),

@@ -4,7 +4,11 @@
 //! density.
 
 mod aerodynamics;
+pub mod check;
 mod document;
+pub mod levels;
+pub mod linear;
+pub mod modes;
 mod propulsion;
 pub mod trim;
 

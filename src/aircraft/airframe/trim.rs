@@ -18,12 +18,22 @@ pub enum Sideways {
     WingsLevel,
 }
 
+impl Sideways {
+    /// As in documents and flags.
+    pub const NAMES: [&'static str; 3] = ["zero_sideslip", "zero_side_force", "wings_level"];
+
+    pub fn named(name: &str) -> Option<Sideways> {
+        let all = [Sideways::ZeroSideslip, Sideways::ZeroSideForce, Sideways::WingsLevel];
+        Self::NAMES.iter().position(|known| *known == name).map(|i| all[i])
+    }
+}
+
 /// How the airplane turns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Turn {
     /// rad/s, positive to the right.
     Rate(f64),
-    /// Bank of a coordinated turn, rad.
+    /// Angle of bank φ, rad; the rate of the turn follows.
     Bank(f64),
 }
 
@@ -59,25 +69,38 @@ pub struct Trim {
 
 /// A flight that is not possible, by what is missing.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{0}")]
-pub struct TrimError(pub String);
+#[error("{message}")]
+pub struct TrimError {
+    /// "lift", "elevator", "aileron", "rudder", "thrust", "brake"; "solution" when Newton's method finds none, "request" when it asks for what is nothing.
+    pub missing: &'static str,
+    pub message: String,
+}
+
+impl TrimError {
+    pub(super) fn new(missing: &'static str, message: impl Into<String>) -> TrimError {
+        TrimError { missing, message: message.into() }
+    }
+}
 
 type Unknowns = SVector<f64, 8>;
 
 impl Airplane {
     /// Errors: outside the standard atmosphere, or lift, elevator, thrust or another control does not suffice.
     pub fn trim(&self, request: &TrimRequest) -> Result<Trim, TrimError> {
-        let air = standard::at(request.altitude).map_err(|e| TrimError(e.to_string()))?;
+        let air = standard::at(request.altitude).map_err(|e| TrimError::new("request", e.to_string()))?;
         let speed = request.airspeed;
         if !(speed > 0.0 && speed.is_finite()) {
-            return Err(TrimError(format!("airspeed {speed} m/s: expected a positive speed")));
+            return Err(TrimError::new("request", format!("airspeed {speed} m/s: expected a positive speed")));
         }
         let g = standard::GRAVITY;
-        let turn_rate = match request.turn {
-            Turn::Rate(rate) => rate,
-            Turn::Bank(bank) => g * bank.tan() / speed,
+        // of a point mass
+        let (bank, turn_rate) = match request.turn {
+            Turn::Rate(rate) => ((speed * request.climb.cos() * rate / g).atan(), rate),
+            Turn::Bank(bank) => (bank, g * bank.tan() / (speed * request.climb.cos())),
         };
-        let bank = (speed * turn_rate / g).atan();
+        if let (Sideways::WingsLevel, Turn::Bank(_)) = (request.sideways, request.turn) {
+            return Err(TrimError::new("request", "wings_level and a bank ask for two angles of bank: give a turn rate instead"));
+        }
         let pressure = 0.5 * air.density * speed * speed * self.size.area;
         let needed = self.mass * g * request.climb.cos() / (pressure * bank.cos());
         let lift = &self.aerodynamics.lift;
@@ -85,21 +108,30 @@ impl Airplane {
             let most = (0..200)
                 .map(|i| self.aerodynamics.lift_and_drag(&self.size, stall.angle * f64::from(i) / 150.0, 0.0, 0.0).0)
                 .fold(0.0, f64::max);
-            if needed > most {
-                return Err(TrimError(format!(
-                    "no lift: {speed} m/s{} needs a lift coefficient of {needed:.2}, the wing stalls at {most:.2}; fly faster or turn less",
-                    if bank == 0.0 {
-                        String::new()
-                    } else {
-                        format!(" in a turn of {:.1} deg bank", bank.to_degrees())
-                    }
-                )));
+            // a wing near its stall is helped by the part of the thrust that points up
+            let thrust = self.propulsion.running(self.propulsion.greatest(), speed, air.density).thrust;
+            if needed > most + (thrust * (stall.angle + request.climb).sin() / pressure).max(0.0) {
+                return Err(TrimError::new(
+                    "lift",
+                    format!(
+                        "no lift: {speed} m/s{} needs a lift coefficient of {needed:.2}, the wing stalls at {most:.2}; fly faster or turn less",
+                        if bank == 0.0 {
+                            String::new()
+                        } else {
+                            format!(" in a turn of {:.1} deg bank", bank.to_degrees())
+                        }
+                    ),
+                ));
             }
         }
         let alpha = (needed - lift.zero) / lift.alpha;
         let throttle = 0.5 * self.propulsion.greatest().min(2.0 * self.mass * g);
-        let mut x = Unknowns::from([alpha, 0.0, bank, alpha + request.climb, 0.0, 0.0, 0.0, throttle]);
-        let residual = |x: &Unknowns| self.lacks(x, request, turn_rate, air.density);
+        let turn = match request.turn {
+            Turn::Rate(_) => bank,
+            Turn::Bank(_) => turn_rate,
+        };
+        let mut x = Unknowns::from([alpha, 0.0, turn, alpha + request.climb, 0.0, 0.0, 0.0, throttle]);
+        let residual = |x: &Unknowns| self.lacks(x, request, air.density);
         let mut r = residual(&x);
         for _ in 0..100 {
             let mut jacobian = SMatrix::<f64, 8, 8>::zeros();
@@ -125,30 +157,26 @@ impl Airplane {
             }
             (x, r) = (next, after);
         }
-        self.judge(&x, r.amax(), turn_rate, air.density, speed)
+        self.judge(&x, r.amax(), request, air.density)
     }
 
     /// u̇ v̇ ẇ ṗ q̇ ṙ, climb and the sideways condition at a set of unknowns.
-    fn lacks(&self, x: &Unknowns, request: &TrimRequest, turn_rate: f64, density: f64) -> Unknowns {
-        let trim = self.state(x, turn_rate, density, request.airspeed);
+    fn lacks(&self, x: &Unknowns, request: &TrimRequest, density: f64) -> Unknowns {
+        let trim = self.state(x, request, density);
         let wrench = self.forces(&AirState { velocity: trim.velocity, rate: trim.rate }, &trim.controls, density);
         let ([u, v, w], [p, q, r]) = (trim.velocity, trim.rate);
         let ((sf, cf), (st, ct)) = (trim.phi.sin_cos(), trim.theta.sin_cos());
         let g = standard::GRAVITY;
         let f = wrench.force.map(|f| f / self.mass);
-        let i = self.inertia;
-        let [hx, hy, hz] = [i.xx * p - i.xz * r, i.yy * q, i.zz * r - i.xz * p];
-        let [l, m, n] = wrench.moment;
-        let (l, m, n) = (l - (q * hz - r * hy), m - (r * hx - p * hz), n - (p * hy - q * hx));
-        let determinant = i.xx * i.zz - i.xz * i.xz;
+        let [p_dot, q_dot, r_dot] = self.inertia.acceleration(wrench.moment, trim.rate);
         let climb = u * st - v * sf * ct - w * cf * ct;
         Unknowns::from([
             f[0] - g * st - (q * w - r * v),
             f[1] + g * sf * ct - (r * u - p * w),
             f[2] + g * cf * ct - (p * v - q * u),
-            (i.zz * l + i.xz * n) / determinant,
-            m / i.yy,
-            (i.xz * l + i.xx * n) / determinant,
+            p_dot,
+            q_dot,
+            r_dot,
             climb - request.airspeed * request.climb.sin(),
             match request.sideways {
                 Sideways::ZeroSideslip => trim.beta,
@@ -158,8 +186,14 @@ impl Airplane {
         ])
     }
 
-    fn state(&self, x: &Unknowns, turn_rate: f64, density: f64, speed: f64) -> Trim {
-        let [alpha, beta, phi, theta, elevator, aileron, rudder, throttle] = (*x).into();
+    /// The unknowns are α, β, the bank (or the turn rate, when the bank is given), θ, elevator, aileron, rudder, throttle.
+    fn state(&self, x: &Unknowns, request: &TrimRequest, density: f64) -> Trim {
+        let [alpha, beta, turn, theta, elevator, aileron, rudder, throttle] = (*x).into();
+        let (phi, turn_rate) = match request.turn {
+            Turn::Rate(rate) => (turn, rate),
+            Turn::Bank(bank) => (bank, turn),
+        };
+        let speed = request.airspeed;
         let ((sa, ca), (sb, cb)) = (alpha.sin_cos(), beta.sin_cos());
         let ((sf, cf), (st, ct)) = (phi.sin_cos(), theta.sin_cos());
         Trim {
@@ -177,48 +211,62 @@ impl Airplane {
     }
 
     /// The solution, if the controls reach it.
-    fn judge(&self, x: &Unknowns, residual: f64, turn_rate: f64, density: f64, speed: f64) -> Result<Trim, TrimError> {
-        let trim = Trim { residual, ..self.state(x, turn_rate, density, speed) };
+    fn judge(&self, x: &Unknowns, residual: f64, request: &TrimRequest, density: f64) -> Result<Trim, TrimError> {
+        let speed = request.airspeed;
+        let trim = Trim { residual, ..self.state(x, request, density) };
         let c = trim.controls;
         for (name, at, actuator) in [("elevator", c.elevator, 0), ("aileron", c.aileron, 1), ("rudder", c.rudder, 2)]
             .map(|(n, c, i)| (n, c, self.actuators[i]))
         {
             let Some([least, greatest]) = actuator.map(|a| a.travel) else { continue };
             if residual < 1e-6 && !(least..=greatest).contains(&at) {
-                return Err(TrimError(format!(
-                    "no {name}: steady flight at {speed} m/s needs {:.1} deg, the stops are {:.1} deg and {:.1} deg",
-                    at.to_degrees(),
-                    least.to_degrees(),
-                    greatest.to_degrees()
-                )));
+                return Err(TrimError::new(
+                    name,
+                    format!(
+                        "no {name}: steady flight at {speed} m/s needs {:.1} deg, the stops are {:.1} deg and {:.1} deg",
+                        at.to_degrees(),
+                        least.to_degrees(),
+                        greatest.to_degrees()
+                    ),
+                ));
             }
         }
         let most = self.propulsion.greatest();
         if !(c.throttle <= most) || !(residual < 1e-6) && c.throttle > 0.9 * most {
-            return Err(TrimError(format!(
-                "no thrust: steady flight at {speed} m/s needs {}, there is {most}",
-                match self.propulsion {
-                    super::Propulsion::Motor(_) => format!("a throttle of {:.3}", c.throttle),
-                    super::Propulsion::Thrust { .. } => format!("a thrust of {:.3} N", c.throttle),
-                }
-            )));
+            return Err(TrimError::new(
+                "thrust",
+                format!(
+                    "no thrust: steady flight at {speed} m/s needs {}, there is {most}",
+                    match self.propulsion {
+                        super::Propulsion::Motor(_) => format!("a throttle of {:.3}", c.throttle),
+                        super::Propulsion::Thrust { .. } => format!("a thrust of {:.3} N", c.throttle),
+                    }
+                ),
+            ));
         }
         if c.throttle < 0.0 {
-            return Err(TrimError(format!(
-                "no brake: steady flight at {speed} m/s needs a throttle below zero; descend less or fly slower"
-            )));
+            return Err(TrimError::new(
+                "brake",
+                format!(
+                    "no brake: steady flight at {speed} m/s needs a throttle below zero; descend less or fly slower"
+                ),
+            ));
         }
         if let Some(stall) = self.aerodynamics.stall.filter(|stall| trim.alpha >= stall.angle) {
-            return Err(TrimError(format!(
-                "no lift: steady flight at {speed} m/s needs an angle of attack of {:.1} deg, the stall is at {:.1} deg",
-                trim.alpha.to_degrees(),
-                stall.angle.to_degrees()
-            )));
+            return Err(TrimError::new(
+                "lift",
+                format!(
+                    "no lift: steady flight at {speed} m/s needs an angle of attack of {:.1} deg, the stall is at {:.1} deg",
+                    trim.alpha.to_degrees(),
+                    stall.angle.to_degrees()
+                ),
+            ));
         }
         if !(residual < 1e-10) {
-            return Err(TrimError(format!(
-                "no steady flight found at {speed} m/s: {residual:.1e} m/s^2 or rad/s^2 remain"
-            )));
+            return Err(TrimError::new(
+                "solution",
+                format!("no steady flight found at {speed} m/s: {residual:.1e} m/s^2 or rad/s^2 remain"),
+            ));
         }
         Ok(trim)
     }

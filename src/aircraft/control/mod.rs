@@ -1,1 +1,5 @@
-//! Linear-quadratic regulator, Gramians, controllability (floor 3).
+//! Controllability, optimal gains and the `linear.json` document (floor 3).
+
+pub mod controllability;
+pub mod document;
+pub mod regulator;

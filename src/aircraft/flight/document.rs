@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Serialize;
 
+use crate::aircraft::airframe::trim::{Sideways, TrimRequest, Turn};
 use crate::aircraft::atmosphere::discrete::Form;
 use crate::aircraft::atmosphere::dryden::Specification;
 use crate::params::place::{self, KeyError, Place};
@@ -82,6 +83,19 @@ pub struct TrimEntry {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("enum" = ["zero_sideslip", "zero_side_force", "wings_level"]))]
     pub lateral: Option<String>,
+}
+
+impl TrimEntry {
+    pub fn request(&self) -> TrimRequest {
+        let si = |m: &Option<Measured>| m.as_ref().map_or(0.0, Measured::si);
+        TrimRequest {
+            airspeed: self.airspeed.si(),
+            altitude: self.altitude.si(),
+            climb: si(&self.climb),
+            turn: self.bank.as_ref().map_or(Turn::Rate(si(&self.turn_rate)), |bank| Turn::Bank(bank.si())),
+            sideways: self.lateral.as_deref().and_then(Sideways::named).unwrap_or_default(),
+        }
+    }
 }
 
 /// Velocity u v w and rate p q r in body axes, relative to the earth; roll, pitch, yaw against north, east, down.

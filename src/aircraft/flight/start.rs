@@ -11,7 +11,7 @@ use super::motion::State;
 use super::servo::Servo;
 use super::surfaces::CONTROLS;
 use super::vector::{Vector, back, from_euler, plus};
-use crate::aircraft::airframe::trim::{Sideways, Trim, TrimRequest, Turn};
+use crate::aircraft::airframe::trim::Trim;
 use crate::aircraft::airframe::{Actuator, Airplane, Propulsion};
 use crate::params::Measured;
 
@@ -49,19 +49,7 @@ pub(super) fn throttle_column(airplane: &Airplane) -> &'static str {
 
 /// The steady flight that the document asks for.
 pub(super) fn trim(entry: &TrimEntry, airplane: &Airplane) -> Result<Trim, FlightError> {
-    let si = |m: &Option<Measured>| m.as_ref().map_or(0.0, Measured::si);
-    let request = TrimRequest {
-        airspeed: entry.airspeed.si(),
-        altitude: entry.altitude.si(),
-        climb: si(&entry.climb),
-        turn: entry.bank.as_ref().map_or(Turn::Rate(si(&entry.turn_rate)), |bank| Turn::Bank(bank.si())),
-        sideways: match entry.lateral.as_deref() {
-            Some("zero_side_force") => Sideways::ZeroSideForce,
-            Some("wings_level") => Sideways::WingsLevel,
-            _ => Sideways::ZeroSideslip,
-        },
-    };
-    airplane.trim(&request).map_err(|e| FlightError(format!("trim: {e}")))
+    airplane.trim(&entry.request()).map_err(|e| FlightError(format!("trim: {e}")))
 }
 
 /// Fixed commands and rows stay within the stops. Errors: the first that does not.

@@ -8,6 +8,7 @@ mod budget;
 mod chart;
 mod consistency;
 mod error;
+mod flight;
 mod ratio;
 mod scale;
 mod sheet;
@@ -21,6 +22,7 @@ pub use consistency::{
     Autocorrelation, Histogram, Nees, Periodogram, autocorrelation, cumulative_periodogram, nees, nis_histogram,
 };
 pub use error::{Component, Errors, Rms, errors, rms};
+pub use flight::{Envelope, TimeLines, Track, time_lines, track};
 pub use ratio::{SpectrumRatio, spectrum_ratio};
 pub use sheet::sheet;
 pub use style::style_sheet;

@@ -28,7 +28,10 @@ impl Table {
     }
 }
 
-struct Keep<'a>(&'a std::sync::Mutex<Vec<(u64, Vec<Vec<f64>>)>>, u64, Vec<Vec<f64>>);
+/// Number and columns of finished runs.
+type Kept = std::sync::Mutex<Vec<(u64, Vec<Vec<f64>>)>>;
+
+struct Keep<'a>(&'a Kept, u64, Vec<Vec<f64>>);
 
 impl RowSink<FlightError> for Keep<'_> {
     fn write(&mut self, columns: &[Vec<f64>]) -> Result<(), FlightError> {
@@ -58,7 +61,7 @@ pub fn times(duration: f64, every: Option<f64>, step: Option<f64>) -> Times {
 /// All runs in their order.
 pub fn runs(document: &Value, times: Times, seed: u64, runs: u64) -> Result<Vec<Table>, String> {
     let plan = plan(document, times)?;
-    let kept = std::sync::Mutex::new(Vec::new());
+    let kept = Kept::new(Vec::new());
     fly(&plan, seed, runs, |run| Ok(Keep(&kept, run, Vec::new()))).map_err(|e: FlightError| e.to_string())?;
     let mut kept = kept.into_inner().unwrap();
     kept.sort_by_key(|(run, _)| *run);

@@ -112,15 +112,16 @@ impl Airplane {
                 jacobian.set_column(j, &((residual(&ahead) - residual(&behind)) / (2.0 * by)));
             }
             let Some(step) = jacobian.lu().solve(&r) else { break };
+            let better = |after: &Unknowns| after.norm() < r.norm();
             let mut part = 1.0;
             let mut next = x - step;
             let mut after = residual(&next);
-            while !(after.norm() < r.norm()) && part > 1e-4 {
+            while !better(&after) && part > 1e-4 {
                 part *= 0.5;
                 next = x - step * part;
                 after = residual(&next);
             }
-            if !(after.norm() < r.norm()) {
+            if !better(&after) {
                 break;
             }
             (x, r) = (next, after);
@@ -194,7 +195,8 @@ impl Airplane {
             }
         }
         let most = self.propulsion.greatest();
-        if !(c.throttle <= most) || !(residual < 1e-6) && c.throttle > 0.9 * most {
+        let solved = residual < 1e-6;
+        if c.throttle > most || (!solved && c.throttle > 0.9 * most) {
             return Err(TrimError(format!(
                 "no thrust: steady flight at {speed} m/s needs {}, there is {most}",
                 match self.propulsion {
@@ -215,7 +217,7 @@ impl Airplane {
                 stall.angle.to_degrees()
             )));
         }
-        if !(residual < 1e-10) {
+        if residual.is_nan() || residual >= 1e-10 {
             return Err(TrimError(format!(
                 "no steady flight found at {speed} m/s: {residual:.1e} m/s^2 or rad/s^2 remain"
             )));

@@ -140,9 +140,8 @@ impl Servo {
             let first = [&rate as &dyn Fn(f64) -> f64, &above, &below]
                 .into_iter()
                 .enumerate()
-                .filter_map(|(limit, f)| {
-                    (f(to) > 0.0).then(|| (if f(from) >= 0.0 { from } else { root(f, from, to).unwrap_or(to) }, limit))
-                })
+                .filter(|(_, f)| f(to) > 0.0)
+                .map(|(limit, f)| (if f(from) >= 0.0 { from } else { root(f, from, to).unwrap_or(to) }, limit))
                 .min_by(|a, b| a.0.total_cmp(&b.0));
             if let Some((t, limit)) = first {
                 *state = at(t);

@@ -1,15 +1,19 @@
 //! `kfdesign fly`.
 
+mod figures;
+
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
 use anyhow::bail;
 
 use super::Status;
 use super::flags::{whole, with_unit};
-use super::output::{digits, print_json, print_text, table};
+use super::output::{digits, print_json, print_text, refuse_same_output, table};
 use crate::aircraft::flight::{FlightDocument, FlightReport, Plan, RowSink, Times, fly};
 use crate::export::atomic;
 use crate::export::table::TableWriter;
+use crate::report::figure::Envelope;
 use crate::units::Dimension;
 
 /// An airplane over time: truth and what its sensors show
@@ -38,21 +42,32 @@ pub struct Args {
     /// Number of runs; each has its own gusts and noise
     #[arg(long, default_value_t = 1, value_parser = whole::<u64>, allow_negative_numbers = true)]
     runs: u64,
+    /// Figures of the first run: attitude, rates, surfaces with their stops, gusts, way over the ground, height
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
     /// One JSON document on stdout
     #[arg(long)]
     json: bool,
 }
 
-/// The log of one run, or nowhere.
-struct Log {
+/// The log of one run, or nowhere, and the lines of figures.
+struct Log<'a> {
     path: Option<PathBuf>,
     writer: Option<TableWriter>,
+    lines: Option<&'a Mutex<Envelope>>,
 }
 
-impl RowSink<anyhow::Error> for Log {
+impl RowSink<anyhow::Error> for Log<'_> {
     fn write(&mut self, columns: &[Vec<f64>]) -> anyhow::Result<()> {
         if let Some(writer) = &mut self.writer {
             writer.write(&columns.iter().map(Vec::as_slice).collect::<Vec<_>>())?;
+        }
+        // one run has figures: nobody else holds the lock
+        if let Some(Ok(mut lines)) = self.lines.map(Mutex::lock) {
+            for row in 0..columns.first().map_or(0, Vec::len) {
+                let values: Vec<f64> = columns.iter().map(|column| column[row]).collect();
+                lines.add(values[0], &values);
+            }
         }
         Ok(())
     }
@@ -71,6 +86,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if let Some(output) = &args.output {
         atomic::refuse_input_as_output(output, &args.flight)?;
     }
+    refuse_same_output(&[("-o", &args.output), ("--plot", &args.plot)])?;
     let time = |flag: &str, text: &str| with_unit(flag, text, Dimension::TIME, "10s");
     let times = Times {
         duration: time("--duration", &args.duration)?,
@@ -81,12 +97,17 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let folder = args.flight.parent().unwrap_or(Path::new("."));
     let plan = Plan::new(&document, folder, &times).map_err(|e| anyhow::anyhow!("{}: {e}", args.flight.display()))?;
     let header = plan.columns();
-    let open = |run: u64| -> anyhow::Result<Log> {
+    let lines = Mutex::new(Envelope::default());
+    let open = |run: u64| -> anyhow::Result<Log<'_>> {
         let path = args.output.as_ref().map(|output| of_run(output, run, args.runs));
         let writer = path.as_ref().map(|path| TableWriter::create(path, &header)).transpose()?;
-        Ok(Log { path, writer })
+        Ok(Log { path, writer, lines: (run == 0 && args.plot.is_some()).then_some(&lines) })
     };
     let report = fly(&plan, args.seed, args.runs, open)?;
+    if let (Some(path), Ok(lines)) = (&args.plot, lines.into_inner()) {
+        let figures = figures::sheet(&report.airplane, &header, &lines, &plan.stops());
+        atomic::write(path, figures.as_bytes())?;
+    }
     if args.json {
         print_json(&report)?
     } else {

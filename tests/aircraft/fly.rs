@@ -1,111 +1,10 @@
-//! Flights: trajectories of a second implementation, order of convergence, the linear model as a limit, what the log holds.
+//! Trajectories against a second implementation, identities of motion, order of convergence, commands and their delays.
 
-use std::path::PathBuf;
+use serde_json::json;
 
-use kfdesign::aircraft::flight::{FlightDocument, FlightError, FlightReport, Plan, RowSink, Times, fly};
-use nalgebra::DMatrix;
-use serde_json::{Value, json};
-
-/// Columns of one run.
-struct Table {
-    names: Vec<String>,
-    columns: Vec<Vec<f64>>,
-}
-
-impl Table {
-    fn get(&self, name: &str) -> &[f64] {
-        let found = self.names.iter().position(|n| n.split(' ').next() == Some(name));
-        &self.columns[found.unwrap_or_else(|| panic!("no column {name} in {:?}", self.names))]
-    }
-    fn last(&self, names: &[&str]) -> Vec<f64> {
-        names.iter().map(|name| *self.get(name).last().unwrap()).collect()
-    }
-    /// The row at a time.
-    fn at(&self, time: f64, names: &[&str]) -> Vec<f64> {
-        let row = self.get("time").iter().position(|t| (t - time).abs() < 1e-9).unwrap();
-        names.iter().map(|name| self.get(name)[row]).collect()
-    }
-}
-
-struct Keep<'a>(&'a std::sync::Mutex<Vec<(u64, Vec<Vec<f64>>)>>, u64, Vec<Vec<f64>>);
-
-impl RowSink<FlightError> for Keep<'_> {
-    fn write(&mut self, columns: &[Vec<f64>]) -> Result<(), FlightError> {
-        self.2.resize(columns.len(), Vec::new());
-        self.2.iter_mut().zip(columns).for_each(|(kept, new)| kept.extend_from_slice(new));
-        Ok(())
-    }
-    fn finish(self) -> Result<Option<String>, FlightError> {
-        self.0.lock().unwrap().push((self.1, self.2));
-        Ok(None)
-    }
-}
-
-fn folder() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("data/airplanes")
-}
-
-fn plan(document: &Value, times: Times) -> Result<Plan, String> {
-    let document = FlightDocument::from_json(&document.to_string(), "flight.json").map_err(|e| e.to_string())?;
-    Plan::new(&document, &folder(), &times).map_err(|e| e.to_string())
-}
-
-fn times(duration: f64, every: Option<f64>, step: Option<f64>) -> Times {
-    Times { duration, every, step }
-}
-
-/// All runs in their order.
-fn runs(document: &Value, times: Times, seed: u64, runs: u64) -> Result<Vec<Table>, String> {
-    let plan = plan(document, times)?;
-    let kept = std::sync::Mutex::new(Vec::new());
-    fly(&plan, seed, runs, |run| Ok(Keep(&kept, run, Vec::new()))).map_err(|e: FlightError| e.to_string())?;
-    let mut kept = kept.into_inner().unwrap();
-    kept.sort_by_key(|(run, _)| *run);
-    Ok(kept.into_iter().map(|(_, columns)| Table { names: plan.columns(), columns }).collect())
-}
-
-fn one(document: &Value, times: Times) -> Table {
-    runs(document, times, 1, 1).unwrap().remove(0)
-}
-
-/// An airplane thrown into the air with its controls fixed: all axes move.
-fn thrown() -> Value {
-    json!({
-        "format": "kfdesign-flight/1",
-        "airplane": "aerosonde.json",
-        "initial": {
-            "altitude": "100 m", "u": "25 m/s", "v": "1 m/s", "w": "1.5 m/s", "phi": "10 deg", "theta": "5 deg", "psi": "30 deg",
-            "p": "0.2 rad/s", "q": "-0.1 rad/s", "r": "0.1 rad/s"
-        },
-        "controls": { "elevator": "-0.14 rad", "aileron": "0.02 rad", "rudder": "-0.01 rad", "throttle": "0.8" }
-    })
-}
-
-fn over_wgs84(mut document: Value) -> Value {
-    document["earth"] = json!({ "wgs84": { "latitude": "48.7 deg", "longitude": "21.25 deg" } });
-    document
-}
-
-fn level() -> Value {
-    json!({
-        "format": "kfdesign-flight/1",
-        "airplane": "aerosonde.json",
-        "trim": { "airspeed": "25 m/s", "altitude": "100 m" }
-    })
-}
-
-/// Differences below `tolerance` each.
-fn near(found: &[f64], expected: &[f64], tolerance: f64) {
-    assert_eq!(found.len(), expected.len());
-    for (f, e) in found.iter().zip(expected) {
-        assert!((f - e).abs() < tolerance, "{found:?} against {expected:?}");
-    }
-}
-
-const PLACE: [&str; 3] = ["north", "east", "down"];
-const VELOCITY: [&str; 3] = ["u", "v", "w"];
-const ANGLES: [&str; 3] = ["phi", "theta", "psi"];
-const RATES: [&str; 3] = ["p", "q", "r"];
+use super::flights::{
+    ANGLES, PLACE, RATES, Table, VELOCITY, aerosonde, level, near, one, over_wgs84, quiet, runs, thrown, times, trim,
+};
 
 /// The sheet's trajectory over the flat earth, to 1e-6 m and 1e-8 m/s.
 #[test]
@@ -194,11 +93,7 @@ fn the_trajectory_over_the_flat_earth() {
 #[test]
 fn the_trajectory_over_the_rotating_earth() {
     let mut document = over_wgs84(thrown());
-    let quiet = json!({
-        "format": "kfdesign-params/1", "quantity": "angular-rate", "sample_rate": "100 Hz",
-        "axes": [{ "name": "x", "white": { "density": "1e-30 rad/s/sqrt(Hz)" } }]
-    });
-    document["sensors"] = json!({ "gyro": quiet });
+    document["sensors"] = json!({ "gyro": quiet("angular-rate", "rad/s") });
     let table = one(&document, times(10.0, Some(1.0), None));
     let expected = [
         (
@@ -212,7 +107,7 @@ fn the_trajectory_over_the_rotating_earth() {
                 1.5,
                 0.174532925,
                 0.087266463,
-                0.523598776,
+                30.0_f64.to_radians(),
                 0.200046296,
                 -0.100032544,
                 0.099954011,
@@ -335,4 +230,178 @@ fn the_integration_is_of_order_four() {
     for pair in errors.windows(2) {
         assert!((3.6..4.6).contains(&(pair[0] / pair[1]).log2()), "{errors:?}");
     }
+}
+
+/// The sheet's flights from trim: elevator and aileron one degree from it.
+#[test]
+fn steps_from_trim_are_those_of_a_second_implementation() {
+    let degree = 1.0_f64.to_radians();
+    let c = trim().controls;
+    let step = |key: &str, at: f64| {
+        let mut document = level();
+        document["controls"] = json!({ key: format!("{:e} rad", at + degree) });
+        one(&document, times(10.0, Some(1.0), None))
+    };
+    let names = [PLACE, VELOCITY, ANGLES, RATES].concat();
+    let elevator = step("elevator", c.elevator);
+    near(
+        &elevator.at(2.0, &names),
+        &[
+            50.212077166,
+            0.003781276,
+            -99.096189323,
+            25.285533659,
+            0.003814768,
+            1.220047583,
+            0.000824706,
+            0.013260719,
+            0.000127551,
+            0.001938600,
+            -0.013619790,
+            0.000346948,
+        ],
+        2e-8,
+    );
+    near(
+        &elevator.at(10.0, &names),
+        &[
+            257.657649195,
+            4.371310226,
+            -91.906113647,
+            25.908428171,
+            0.052693066,
+            1.230315425,
+            0.057067985,
+            0.031349711,
+            0.070472814,
+            0.008156834,
+            0.002729693,
+            0.020389779,
+        ],
+        5e-8,
+    );
+    near(
+        &step("aileron", c.aileron).at(5.0, &names),
+        &[
+            124.153691814,
+            12.444450769,
+            -98.851767642,
+            25.301741147,
+            0.475437705,
+            1.317997325,
+            0.392670940,
+            0.018811124,
+            0.319846595,
+            0.087972218,
+            0.033752158,
+            0.137432742,
+        ],
+        2e-8,
+    );
+}
+
+#[test]
+fn a_trimmed_airplane_stays_in_trim() {
+    let mut document = level();
+    document["trim"]["turn_rate"] = json!("0.1 rad/s");
+    for document in [level(), document] {
+        let table = one(&document, times(10.0, Some(1.0), None));
+        let names = [VELOCITY.as_slice(), &RATES, &ANGLES[..2]].concat();
+        // the standard atmosphere thins out by less than 1e-9 over what the height changes
+        near(&table.last(&names), &table.at(0.0, &names), 1e-9);
+        near(&table.last(&["down"]), &[-100.0], 1e-7);
+    }
+}
+
+/// Over the flat earth wind adds its way and nothing else (Galileo), also in a turn with all axes moving.
+#[test]
+fn wind_carries_the_airplane_along() {
+    let wind = [3.0, -7.0, 0.0];
+    let mut blown = level();
+    blown["trim"]["bank"] = json!("20 deg");
+    let calm = one(&blown, times(20.0, Some(5.0), None));
+    blown["wind"] = json!({ "north": "3 m/s", "east": "-7 m/s" });
+    let blown = one(&blown, times(20.0, Some(5.0), None));
+    for time in [5.0, 20.0] {
+        let moved: Vec<f64> = calm.at(time, &PLACE).iter().zip(wind).map(|(place, wind)| place + wind * time).collect();
+        near(&blown.at(time, &PLACE), &moved, 1e-8);
+        near(&blown.at(time, &[ANGLES, RATES].concat()), &calm.at(time, &[ANGLES, RATES].concat()), 1e-11);
+    }
+    // u, v, w are relative to the ground
+    let speed = |table: &Table| table.at(0.0, &VELOCITY).iter().map(|v| v * v).sum::<f64>();
+    assert!((speed(&calm) - 625.0).abs() < 1e-9 && (speed(&blown) - speed(&calm)).abs() > 1.0);
+}
+
+/// An accelerometer beside the centre of gravity shows ω̇×r + ω×(ω×r) more; ω̇ by differences of the rows.
+#[test]
+fn an_accelerometer_feels_its_lever_arm() {
+    let arm = [0.5, 0.2, -0.1];
+    let mut document = thrown();
+    document["sensors"] = json!({
+        "rate": "400 Hz",
+        "gyro": quiet("angular-rate", "rad/s"),
+        "accelerometer": quiet("specific-force", "m/s^2"),
+    });
+    document["airplane"] = aerosonde();
+    let inside = one(&document, times(1.0, None, None));
+    document["airplane"]["positions"] = json!({ "accelerometer": ["0.5 m", "0.2 m", "-0.1 m"] });
+    let outside = one(&document, times(1.0, None, None));
+    let (gyro, accel) = (["gyro_x", "gyro_y", "gyro_z"], ["accel_x", "accel_y", "accel_z"]);
+    let cross =
+        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let h = 1.0 / 400.0;
+    for k in [4, 40, 200, 396_usize] {
+        let rate = |k: usize| gyro.map(|name| inside.get(name)[k]);
+        let turning: [f64; 3] = std::array::from_fn(|i| {
+            let w = |k: usize| rate(k)[i];
+            (8.0 * (w(k + 1) - w(k - 1)) - (w(k + 2) - w(k - 2))) / (12.0 * h)
+        });
+        let (a, b) = (cross(turning, arm), cross(rate(k), cross(rate(k), arm)));
+        for i in 0..3 {
+            let more = outside.get(accel[i])[k] - inside.get(accel[i])[k];
+            assert!((more - a[i] - b[i]).abs() < 1e-5, "{k} {i}: {more} against {}", a[i] + b[i]);
+        }
+    }
+    // at rest in trim it shows the forces over the mass: the sheet's, 9 digits
+    let mut document = level();
+    document["sensors"] = json!({ "accelerometer": quiet("specific-force", "m/s^2") });
+    near(&one(&document, times(0.1, None, None)).last(&accel), &[0.528067687, 0.005195466, -9.792420628], 1e-8);
+}
+
+/// With one sample of delay the servo receives the command of sample k from sample k + 1 on.
+#[test]
+fn a_command_comes_as_late_as_the_document_says() {
+    for delay in [0, 1, 3_usize] {
+        let mut document = level();
+        document["autopilot"] = json!({
+            "rate": "100 Hz", "delay": format!("{delay} samples"), "pitch": "8 deg",
+            "gains": { "kq": "0.2 s", "ktheta": 0.6, "kp": "0.06 s", "kphi": 0.6, "kr": "0.15 s" }
+        });
+        let table = one(&document, times(0.1, None, None));
+        let elevator = table.get("elevator");
+        assert!(elevator[..=delay].iter().all(|e| (e - elevator[0]).abs() < 1e-12), "{delay}: {elevator:?}");
+        // nose up: trailing edge up
+        assert!(elevator[delay + 1] < elevator[0] - 1e-4, "{delay}: {elevator:?}");
+    }
+}
+
+/// Rows of a file between two steps cut the step: the length of the steps changes nothing.
+#[test]
+fn commands_of_a_file_arrive_when_they_are_given() {
+    let c = trim().controls;
+    let bench = crate::support::Bench::new();
+    let e = c.elevator.to_degrees();
+    let file = bench
+        .file("commands.csv", format!("time (s),elevator (deg)\n0,{e:e}\n0.10371,{:e}\n0.7,{e:e}\n3,{e:e}\n", e + 2.0));
+    let mut document = level();
+    document["controls"] = json!({ "file": file });
+    let fly = |step: f64| one(&document, times(2.0, Some(1.0), Some(step)));
+    let (coarse, fine) = (fly(2.5e-3), fly(5e-4));
+    for names in [PLACE, VELOCITY, ANGLES, RATES] {
+        near(&coarse.last(&names), &fine.last(&names), 2e-8);
+    }
+    let moved = one(&level(), times(2.0, Some(1.0), None)).last(&["theta"])[0] - fine.last(&["theta"])[0];
+    assert!(moved.abs() > 1e-3);
+    let short = runs(&document, times(4.0, Some(1.0), None), 1, 1).err().unwrap();
+    assert!(short.contains("commands.csv: ends at 3 s, before the 4 s"), "{short}");
 }

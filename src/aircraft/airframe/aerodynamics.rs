@@ -70,7 +70,9 @@ pub struct Aerodynamics {
 impl Stall {
     /// 0 far below the stall, 1 far above.
     pub fn blend(&self, alpha: f64) -> f64 {
-        let (a, b) = ((-self.sharpness * (alpha - self.angle)).exp(), (self.sharpness * (alpha + self.angle)).exp());
+        let both = (self.sharpness * self.angle).exp();
+        let one = (self.sharpness * alpha).exp();
+        let (a, b) = (both / one, both * one);
         // (1 + a + b)/((1 + a)(1 + b)) without products of large numbers
         let (x, y) = (1.0 / (1.0 + a), 1.0 / (1.0 + b));
         x + y - x * y

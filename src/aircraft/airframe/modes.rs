@@ -99,7 +99,7 @@ pub fn modes(model: &LinearModel, speed: f64) -> Result<Vec<Mode>, LinalgError> 
     let a = &model.in_angles(speed).a;
     let longitudinal: Vec<bool> = model.states.iter().map(|s| ["u", "w", "q", "theta"].contains(&s.0)).collect();
     let mut found = Vec::new();
-    for eigenvalue in eigenvalues(a).into_iter().filter(|e| !(e.1 < 0.0)) {
+    for eigenvalue in eigenvalues(a).into_iter().filter(|e| e.1 >= 0.0) {
         let vector = null_vector(a, eigenvalue)?;
         let share = vector.iter().zip(longitudinal.iter().cycle()).map(|(x, l)| if *l { x * x } else { 0.0 });
         let along = share.sum::<f64>() > 0.5;

@@ -99,7 +99,10 @@ impl Airplane {
             Turn::Bank(bank) => (bank, g * bank.tan() / (speed * request.climb.cos())),
         };
         if let (Sideways::WingsLevel, Turn::Bank(_)) = (request.sideways, request.turn) {
-            return Err(TrimError::new("request", "wings_level and a bank ask for two angles of bank: give a turn rate instead"));
+            return Err(TrimError::new(
+                "request",
+                "wings_level and a bank ask for two angles of bank: give a turn rate instead",
+            ));
         }
         let pressure = 0.5 * air.density * speed * speed * self.size.area;
         let needed = self.mass * g * request.climb.cos() / (pressure * bank.cos());
@@ -144,15 +147,16 @@ impl Airplane {
                 jacobian.set_column(j, &((residual(&ahead) - residual(&behind)) / (2.0 * by)));
             }
             let Some(step) = jacobian.lu().solve(&r) else { break };
+            let better = |after: &Unknowns| after.norm() < r.norm();
             let mut part = 1.0;
             let mut next = x - step;
             let mut after = residual(&next);
-            while !(after.norm() < r.norm()) && part > 1e-4 {
+            while !better(&after) && part > 1e-4 {
                 part *= 0.5;
                 next = x - step * part;
                 after = residual(&next);
             }
-            if !(after.norm() < r.norm()) {
+            if !better(&after) {
                 break;
             }
             (x, r) = (next, after);
@@ -232,7 +236,8 @@ impl Airplane {
             }
         }
         let most = self.propulsion.greatest();
-        if !(c.throttle <= most) || !(residual < 1e-6) && c.throttle > 0.9 * most {
+        let solved = residual < 1e-6;
+        if c.throttle > most || (!solved && c.throttle > 0.9 * most) {
             return Err(TrimError::new(
                 "thrust",
                 format!(
@@ -262,7 +267,7 @@ impl Airplane {
                 ),
             ));
         }
-        if !(residual < 1e-10) {
+        if residual.is_nan() || residual >= 1e-10 {
             return Err(TrimError::new(
                 "solution",
                 format!("no steady flight found at {speed} m/s: {residual:.1e} m/s^2 or rad/s^2 remain"),

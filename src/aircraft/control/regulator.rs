@@ -50,11 +50,11 @@ pub fn regulator(
         change = (&next - &sign).norm() / next.norm();
         sign = next;
         // as near as rounding lets it come: the change no longer falls
-        if change < 1e-8 && change >= 0.5 * before || change < 1e-15 {
+        if (change < 1e-8 && change >= 0.5 * before) || change < 1e-15 {
             break;
         }
     }
-    if !(change < 1e-6) {
+    if change.is_nan() || change >= 1e-6 {
         return Err(LinalgError::NoConvergence { iterations: STEPS, residual: change });
     }
     // [W12; W22 + I] X = −[W11 + I; W21]
@@ -71,7 +71,7 @@ pub fn regulator(
         x = newton(a, b, q, r, &r_b, &x)?;
     }
     let slowest = eigenvalues(&(a - b * &r_b * &x)).into_iter().map(|e| e.0).fold(f64::NEG_INFINITY, f64::max);
-    if !(slowest < 0.0) {
+    if slowest.is_nan() || slowest >= 0.0 {
         // an unstable motion that the inputs do not reach
         return Err(LinalgError::NoConvergence { iterations: STEPS, residual: slowest });
     }

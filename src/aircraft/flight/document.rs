@@ -143,10 +143,10 @@ pub struct ControlsEntry {
 pub enum EarthEntry {
     #[default]
     Flat,
-    Wgs84(PlaceEntry),
+    Wgs84(Box<PlaceEntry>),
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlaceEntry {
     /// Geodetic.

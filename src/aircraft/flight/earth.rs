@@ -123,7 +123,7 @@ impl Earth {
     }
 
     /// A vector in local north, east, down turned into the axes of the position.
-    pub(super) fn from_local(self, r: Vector, v: Vector) -> Vector {
+    pub(super) fn of_local(self, r: Vector, v: Vector) -> Vector {
         back(&self.local(r), v)
     }
 

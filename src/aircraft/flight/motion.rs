@@ -85,8 +85,7 @@ impl<'a> World<'a> {
         let inertial = inertial_rate(x);
         let earth_rate = back(&c, field.rate);
         let rate = minus(inertial, earth_rate);
-        let wind =
-            if self.wind == [0.0; 3] { [0.0; 3] } else { back(&c, self.earth.from_local(position(x), self.wind)) };
+        let wind = if self.wind == [0.0; 3] { [0.0; 3] } else { back(&c, self.earth.of_local(position(x), self.wind)) };
         let through_air = minus(minus(v, wind), gust.velocity);
         let air = AirState { velocity: through_air, rate: minus(rate, gust.rate) };
         let wrench = self.airplane.forces(&air, controls, standard::at(field.height)?.density);

@@ -191,7 +191,7 @@ impl Plan {
 /// Through the steady air.
 fn airspeed(world: &World<'_>, x: &State) -> f64 {
     let c = matrix(super::motion::attitude(x));
-    let wind = back(&c, world.earth.from_local(super::motion::position(x), world.wind));
+    let wind = back(&c, world.earth.of_local(super::motion::position(x), world.wind));
     let v = minus(super::motion::velocity(x), wind);
     dot(v, v).sqrt()
 }

@@ -70,6 +70,15 @@ impl Plan {
         rows::header(self)
     }
 
+    /// Of the surfaces, rad, each once.
+    pub fn stops(&self) -> Vec<f64> {
+        let stops = self.airplane.actuators.iter().flatten().flat_map(|actuator| actuator.travel);
+        let mut stops: Vec<f64> = stops.filter(|stop| stop.is_finite()).collect();
+        stops.sort_by(f64::total_cmp);
+        stops.dedup();
+        stops
+    }
+
     pub(super) fn has_gusts(&self) -> bool {
         !(self.dryden.is_empty() && self.discrete.is_empty())
     }

@@ -221,8 +221,8 @@ impl Row {
         let truths = [inertial_rate(x), measured.specific_force];
         let there = [sensors.gyro.is_some(), sensors.accelerometer.is_some()];
         for ((truth, errors), _) in truths.iter().zip(&measured.errors).zip(there).filter(|(_, there)| *there) {
-            for i in 0..3 {
-                row.extend([truth[i], errors.bias[i], errors.drift[i]]);
+            for ((truth, bias), drift) in truth.iter().zip(errors.bias).zip(errors.drift) {
+                row.extend([*truth, bias, drift]);
             }
         }
         row.extend(surfaces.rates());

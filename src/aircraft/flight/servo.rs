@@ -35,21 +35,39 @@ impl Servo {
 
     /// Moves for `dt` (s) with the command held.
     pub fn advance(&self, state: &mut ServoState, command: f64, dt: f64) {
+        self.advance_again(state, command, dt, &mut None);
+    }
+
+    /// The same; `known` is the linear motion of the call before, which serves again when the time is the same.
+    pub(super) fn advance_again(&self, state: &mut ServoState, command: f64, dt: f64, known: &mut Option<Transition>) {
         let parts = (self.frequency * dt / LONGEST_TURN).ceil().max(1.0);
+        let part = dt / parts;
+        let whole = match known {
+            Some(transition) if transition.dt == part => *transition,
+            _ => *known.insert(self.transition(part)),
+        };
         for _ in 0..parts as u64 {
-            self.advance_part(state, command, dt / parts);
+            self.advance_part(state, command, &whole);
         }
     }
 
-    fn advance_part(&self, state: &mut ServoState, command: f64, dt: f64) {
+    fn advance_part(&self, state: &mut ServoState, command: f64, whole: &Transition) {
+        let dt = whole.dt;
         let mut left = dt;
         // each pass ends at a limit or at the end; a pass of no length at all changes the regime at least once
         for _ in 0..16 {
             if left <= 0.0 {
                 return;
             }
-            left -= self.regime(state, command, left);
+            left -= self.regime(state, command, left, whole);
         }
+        // no time is lost where limits meet within rounding
+        let end = self.linear(*state, command, left);
+        let [lowest, highest] = self.travel;
+        *state = ServoState {
+            angle: end.angle.clamp(lowest, highest),
+            rate: end.rate.clamp(-self.rate_limit, self.rate_limit),
+        };
     }
 
     fn acceleration(&self, state: ServoState, command: f64) -> f64 {
@@ -57,7 +75,7 @@ impl Servo {
     }
 
     /// Moves to the end of the regime or of `dt`, whichever comes first; the time it took.
-    fn regime(&self, state: &mut ServoState, command: f64, dt: f64) -> f64 {
+    fn regime(&self, state: &mut ServoState, command: f64, dt: f64, whole: &Transition) -> f64 {
         let [lowest, highest] = self.travel;
         let acceleration = self.acceleration(*state, command);
         let outward = if state.angle >= highest {
@@ -72,7 +90,7 @@ impl Servo {
             if outward * self.acceleration(*state, command) >= 0.0 {
                 return dt;
             }
-            return self.free(state, command, dt);
+            return self.free(state, command, dt, whole);
         }
         let limited = state.rate.abs() >= self.rate_limit && acceleration * state.rate >= 0.0;
         if limited {
@@ -87,17 +105,17 @@ impl Servo {
                 *state = ServoState { angle: stop, rate: 0.0 };
             } else if time >= leaves {
                 // on the other side of the limit by rounding, so that the free regime takes over
-                return time + self.free(state, command, dt - time);
+                return time + self.free(state, command, dt - time, whole);
             }
             return time;
         }
-        self.free(state, command, dt)
+        self.free(state, command, dt, whole)
     }
 
     /// The linear motion up to the first limit.
-    fn free(&self, state: &mut ServoState, command: f64, dt: f64) -> f64 {
+    fn free(&self, state: &mut ServoState, command: f64, dt: f64, whole: &Transition) -> f64 {
         let start = *state;
-        let end = self.linear(start, command, dt);
+        let end = if dt == whole.dt { whole.apply(start, command) } else { self.linear(start, command, dt) };
         // quick: far from every limit
         let (a0, a1) = (self.acceleration(start, command).abs(), self.acceleration(end, command).abs());
         let fastest = start.rate.abs().max(end.rate.abs()) + a0.max(a1) * dt;
@@ -115,15 +133,15 @@ impl Servo {
         knots.sort_by(f64::total_cmp);
         for pair in knots.windows(2) {
             let (from, to) = (pair[0], pair[1]);
-            let rate = |t: f64| at(t).rate.abs() - self.rate_limit;
+            // beyond rounding: where the limit is left the rate is at it
+            let rate = |t: f64| at(t).rate.abs() - self.rate_limit * (1.0 + 1e-12);
             let above = |t: f64| at(t).angle - self.travel[1];
             let below = |t: f64| self.travel[0] - at(t).angle;
             let first = [&rate as &dyn Fn(f64) -> f64, &above, &below]
                 .into_iter()
                 .enumerate()
-                .filter_map(|(limit, f)| {
-                    (f(to) > 0.0).then(|| (if f(from) >= 0.0 { from } else { root(f, from, to).unwrap_or(to) }, limit))
-                })
+                .filter(|(_, f)| f(to) > 0.0)
+                .map(|(limit, f)| (if f(from) >= 0.0 { from } else { root(f, from, to).unwrap_or(to) }, limit))
                 .min_by(|a, b| a.0.total_cmp(&b.0));
             if let Some((t, limit)) = first {
                 *state = at(t);
@@ -141,8 +159,12 @@ impl Servo {
 
     /// Without limits.
     fn linear(&self, state: ServoState, command: f64, dt: f64) -> ServoState {
+        self.transition(dt).apply(state, command)
+    }
+
+    /// The linear motion over a time.
+    fn transition(&self, dt: f64) -> Transition {
         let (w, z) = (self.frequency, self.damping);
-        let (e, v) = (state.angle - command, state.rate);
         let decay = (-z * w * dt).exp();
         // e(t) = e^(−ζωt)(e c + (v + ζω e) s), c = cos ωd t and s = sin(ωd t)/ωd, or their limits and hyperbolic forms
         let square = 1.0 - z * z;
@@ -156,10 +178,23 @@ impl Servo {
         } else {
             (1.0, dt)
         };
-        ServoState {
-            angle: command + decay * (e * c + (v + z * w * e) * s),
-            rate: decay * (v * c - w * (w * e + z * v) * s),
-        }
+        let z = z * w;
+        Transition { dt, m: [[decay * (c + z * s), decay * s], [-decay * w * w * s, decay * (c - z * s)]] }
+    }
+}
+
+/// (δ − δc, v) after a time, a matrix by rows.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Transition {
+    dt: f64,
+    m: [[f64; 2]; 2],
+}
+
+impl Transition {
+    fn apply(&self, state: ServoState, command: f64) -> ServoState {
+        let [[a, b], [c, d]] = self.m;
+        let (e, v) = (state.angle - command, state.rate);
+        ServoState { angle: command + a * e + b * v, rate: c * e + d * v }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::servo::{Servo, ServoState};
+use super::servo::{Servo, ServoState, Transition};
 use crate::aircraft::airframe::Controls;
 
 /// Elevator, aileron, rudder, throttle or thrust.
@@ -19,6 +19,8 @@ pub(super) struct Surface {
     delay: f64,
     command: f64,
     state: ServoState,
+    /// Of the last step.
+    motion: Option<Transition>,
     /// When which command arrives.
     pending: VecDeque<(f64, f64)>,
 }
@@ -27,7 +29,7 @@ impl Surface {
     /// At rest at a command.
     pub(super) fn new(servo: Option<Servo>, delay: f64, command: f64) -> Surface {
         let state = servo.map_or(ServoState { angle: command, rate: 0.0 }, |servo| servo.at_rest(command));
-        Surface { servo, delay, command, state, pending: VecDeque::new() }
+        Surface { servo, delay, command, state, motion: None, pending: VecDeque::new() }
     }
 
     /// A command given at a time.
@@ -47,7 +49,7 @@ impl Surface {
 
     fn advance(&mut self, dt: f64) {
         if let Some(servo) = &self.servo {
-            servo.advance(&mut self.state, self.command, dt);
+            servo.advance_again(&mut self.state, self.command, dt, &mut self.motion);
         }
     }
 }

@@ -157,7 +157,7 @@ fn earth(place: &Place<'_>) -> Result<EarthEntry, KeyError> {
     match place.value() {
         Value::String(text) if text == "flat" => return Ok(EarthEntry::Flat),
         Value::String(text) if text == "wgs84" => {
-            return Ok(EarthEntry::Wgs84(PlaceEntry { latitude: None, longitude: None, heading: None }));
+            return Ok(EarthEntry::Wgs84(Box::default()));
         }
         Value::String(text) => return Err(place.error(format!("'{text}' is not known; known are flat, wgs84"))),
         _ => {}
@@ -165,11 +165,11 @@ fn earth(place: &Place<'_>) -> Result<EarthEntry, KeyError> {
     let o = place.object(&["wgs84"])?.required("wgs84")?;
     let o = o.object(&["latitude", "longitude", "heading"])?;
     let angle = |key: &str| value(&o, key, ANGLE, Range::Any);
-    Ok(EarthEntry::Wgs84(PlaceEntry {
+    Ok(EarthEntry::Wgs84(Box::new(PlaceEntry {
         latitude: angle("latitude")?,
         longitude: angle("longitude")?,
         heading: angle("heading")?,
-    }))
+    })))
 }
 
 fn wind(place: &Place<'_>) -> Result<WindEntry, KeyError> {

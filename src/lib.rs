@@ -4,6 +4,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod aircraft;
 pub mod allan;
 pub mod cli;
 pub mod compare;

@@ -4,6 +4,7 @@
 #![allow(clippy::print_stdout, reason = "a skipped test says so")]
 #![allow(unreachable_pub, reason = "modules of one binary share the support module")]
 
+mod aircraft;
 mod allan;
 mod architecture;
 mod attitude;

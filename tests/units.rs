@@ -116,7 +116,7 @@ fn what_is_no_unit_or_could_be_two_is_refused_with_a_hint() {
         ("counts", "1/131 deg/s"),
         ("deg C", "degC"),
         ("foo", "known are"),
-        ("V", "known are"),
+        ("W", "known are"),
         ("deg/s√Hz", "two ways"),
         ("deg/s·√Hz", "two ways"),
         ("deg/s sqrt(Hz)", "two ways"),

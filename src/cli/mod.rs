@@ -4,6 +4,7 @@
 //! It is that of the work, once known, whatever happens to stdout or stderr.
 
 mod aid_columns;
+pub mod airplane;
 pub mod allan;
 mod allan_figure;
 mod checked;
@@ -13,6 +14,7 @@ pub mod datasheet;
 pub mod export;
 mod files;
 mod flags;
+pub mod fly;
 pub mod identify;
 pub mod import;
 pub mod inflate;
@@ -28,6 +30,7 @@ pub mod simulate;
 mod stop;
 mod stretch;
 mod tests_table;
+pub mod trim;
 pub mod tune;
 mod windows;
 
@@ -91,6 +94,9 @@ enum Command {
     Compare(compare::Args),
     Inflate(inflate::Args),
     Simulate(simulate::Args),
+    Airplane(airplane::Args),
+    Trim(trim::Args),
+    Fly(fly::Args),
     Tune(tune::Args),
     Replay(replay::Args),
     Montecarlo(montecarlo::Args),
@@ -126,6 +132,9 @@ pub fn main(stop: &Stop) -> ExitCode {
         Command::Compare(args) => compare::run(&args),
         Command::Inflate(args) => inflate::run(&args),
         Command::Simulate(args) => simulate::run(&args),
+        Command::Airplane(args) => airplane::run(&args),
+        Command::Trim(args) => trim::run(&args),
+        Command::Fly(args) => fly::run(&args),
         Command::Tune(args) => tune::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Montecarlo(args) => montecarlo::run(&args, stop),

@@ -3,6 +3,10 @@
 use clap::ValueEnum;
 
 use super::{Status, output};
+use crate::aircraft::airframe::AirplaneDocument;
+use crate::aircraft::airframe::check::AirplaneCheck;
+use crate::aircraft::control::document::LinearDocument;
+use crate::aircraft::flight::{FlightDocument, FlightReport};
 use crate::compare::Comparison;
 use crate::compare::inflation::Inflation;
 use crate::filter::{AttitudeDesign, FilterDesign};
@@ -29,6 +33,16 @@ enum Document {
     Filter,
     /// attitude.json: the filter of the plant attitude
     Attitude,
+    /// airplane.json: an airplane
+    Airplane,
+    /// linear.json: steady flight and linear models
+    Linear,
+    /// What `airplane --json` prints
+    AirplaneCheck,
+    /// flight.json: an airplane, its air and its sensors
+    Flight,
+    /// What `fly --json` prints
+    Fly,
     /// What `info --json` prints
     Info,
     /// What `replay --json` prints
@@ -49,6 +63,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         Document::Filter => FilterDesign::schema(),
         Document::Attitude => AttitudeDesign::schema(),
         Document::AttitudeReplay => schemars::schema_for!(AttitudeReplay).to_value(),
+        Document::Airplane => AirplaneDocument::schema(),
+        Document::Linear => schemars::schema_for!(LinearDocument).to_value(),
+        Document::AirplaneCheck => schemars::schema_for!(AirplaneCheck).to_value(),
+        Document::Flight => FlightDocument::schema(),
+        Document::Fly => schemars::schema_for!(FlightReport).to_value(),
         Document::Montecarlo => montecarlo::document::schema(),
         Document::Compare => schemars::schema_for!(Comparison).to_value(),
         Document::Inflate => schemars::schema_for!(Inflation).to_value(),

@@ -9,3 +9,4 @@ pub mod quadratic_form;
 pub mod random;
 pub mod reduce;
 pub mod riccati;
+pub mod van_loan;

@@ -163,12 +163,17 @@ impl Scenario {
 impl Simulator {
     /// A simulator at its first sample. Errors: the scenario does not fit, or a line is not below half its sample rate.
     pub fn new(params: &Params, scenario: &Scenario) -> Result<Simulator, SimulateError> {
+        Simulator::of_axes(params, scenario, 0)
+    }
+
+    /// The same for a sensor beside others: its axes have the numbers `first`, `first + 1`, … in the addresses of streams.
+    pub fn of_axes(params: &Params, scenario: &Scenario, first: u32) -> Result<Simulator, SimulateError> {
         scenario.check(params.axes.len())?;
         let dt = 1.0 / scenario.rate_hz;
         for axis in &params.axes {
             axis.noise().check_rate(dt).map_err(|e| SimulateError(format!("axis '{}': {e}", axis.name)))?;
         }
-        let axes = (0..).zip(&params.axes).map(|(i, axis)| AxisGenerator::new(axis, i, scenario, dt)).collect();
+        let axes = (first..).zip(&params.axes).map(|(i, axis)| AxisGenerator::new(axis, i, scenario, dt)).collect();
         Ok(Simulator { axes, scenario: scenario.clone(), next: 0 })
     }
 

@@ -22,6 +22,17 @@ const NAMED: &[(i8, i8, i8, &str, &str)] = &[
     (0, 0, -2, "a frequency", "Hz"),
 ];
 
+/// Of mechanics and electricity: doubled exponents of angle, length, time, mass, current, then name and example.
+const WITH_MASS: &[([i8; 5], &str, &str)] = &[
+    ([0, 0, 0, 2, 0], "a mass", "kg"),
+    ([0, 4, 0, 2, 0], "a moment of inertia", "kg m^2"),
+    ([0, 2, -4, 2, 0], "a force", "N"),
+    ([0, 4, -6, 2, -2], "a voltage", "V"),
+    ([0, 4, -6, 2, -4], "a resistance", "ohm"),
+    ([0, 0, 0, 0, 2], "a current", "A"),
+    ([2, -4, 4, -2, 2], "an angular rate per voltage", "rpm/V"),
+];
+
 /// Largest doubled exponent a unit may reach.
 const LARGEST: i16 = 24;
 
@@ -30,10 +41,18 @@ impl Dimension {
     pub const TIME: Dimension = Dimension::new(0, 0, 2);
     pub const FREQUENCY: Dimension = Dimension::new(0, 0, -2);
     pub const TEMPERATURE: Dimension = Dimension { temperature: 2, ..Dimension::NONE };
+    pub const MASS: Dimension = Dimension { mass: 2, ..Dimension::NONE };
+    pub const CURRENT: Dimension = Dimension { current: 2, ..Dimension::NONE };
+    pub const FORCE: Dimension = Dimension { mass: 2, ..Dimension::new(0, 2, -4) };
+    pub const INERTIA: Dimension = Dimension { mass: 2, ..Dimension::new(0, 4, 0) };
+    pub const VOLTAGE: Dimension = Dimension { mass: 2, current: -2, ..Dimension::new(0, 4, -6) };
+    pub const RESISTANCE: Dimension = Dimension { mass: 2, current: -4, ..Dimension::new(0, 4, -6) };
+    /// Of a motor.
+    pub const RATE_PER_VOLTAGE: Dimension = Dimension { mass: -2, current: 2, ..Dimension::new(2, -4, 4) };
 
     /// Doubled exponents of angle, length, time.
     pub const fn new(angle: i8, length: i8, time: i8) -> Self {
-        Dimension { angle, length, time, temperature: 0 }
+        Dimension { angle, length, time, temperature: 0, mass: 0, current: 0 }
     }
 
     /// The change of this dimension with temperature.
@@ -57,7 +76,10 @@ impl Dimension {
         if self.temperature == -2 {
             return format!("{} per temperature", Dimension { temperature: 0, ..self }.name());
         }
-        format!("a {}", self.powers(["angle", "length", "time", "temperature"]))
+        if let Some(named) = self.named_with_mass() {
+            return named.1.to_string();
+        }
+        format!("a {}", self.powers(["angle", "length", "time", "temperature", "mass", "current"]))
     }
 
     /// A unit of this dimension.
@@ -68,7 +90,10 @@ impl Dimension {
         if self.temperature == -2 {
             return format!("{}/degC", Dimension { temperature: 0, ..self }.example());
         }
-        self.named().map_or_else(|| self.powers(["rad", "m", "s", "K"]), |named| named.4.to_string())
+        if let Some(named) = self.named_with_mass() {
+            return named.2.to_string();
+        }
+        self.named().map_or_else(|| self.powers(["rad", "m", "s", "K", "kg", "A"]), |named| named.4.to_string())
     }
 
     /// self · other^(half_power/2), where `other` is a symbol's dimension (whole powers); saturates.
@@ -87,6 +112,8 @@ impl Dimension {
             length: add(self.length, other.length)?,
             time: add(self.time, other.time)?,
             temperature: add(self.temperature, other.temperature)?,
+            mass: add(self.mass, other.mass)?,
+            current: add(self.current, other.current)?,
         })
     }
 
@@ -94,8 +121,13 @@ impl Dimension {
         NAMED.iter().find(|n| Dimension::new(n.0, n.1, n.2) == self)
     }
 
-    fn powers(self, base: [&str; 4]) -> String {
-        let exponents = [self.angle, self.length, self.time, self.temperature];
+    fn named_with_mass(self) -> Option<&'static ([i8; 5], &'static str, &'static str)> {
+        let exponents = [self.angle, self.length, self.time, self.mass, self.current];
+        WITH_MASS.iter().find(|named| self.temperature == 0 && named.0 == exponents)
+    }
+
+    fn powers(self, base: [&str; 6]) -> String {
+        let exponents = [self.angle, self.length, self.time, self.temperature, self.mass, self.current];
         let words: Vec<String> = base
             .iter()
             .zip(exponents)

@@ -27,6 +27,9 @@ pub struct Dimension {
     pub length: i8,
     pub time: i8,
     pub temperature: i8,
+    pub mass: i8,
+    /// Electric.
+    pub current: i8,
 }
 
 /// A parsed unit: the text as the user wrote it, its factor to SI and its dimension.

@@ -15,6 +15,7 @@ pub(super) struct Symbol {
 const ANGLE: Dimension = Dimension::new(2, 0, 0);
 const RATE: Dimension = Dimension::new(2, 0, -2);
 const LENGTH: Dimension = Dimension::new(0, 2, 0);
+const VELOCITY: Dimension = Dimension::new(0, 2, -2);
 const FORCE: Dimension = Dimension::new(0, 2, -4);
 const TEMPERATURE: Dimension = Dimension::TEMPERATURE;
 
@@ -37,12 +38,18 @@ const TABLE: &[Row] = &[
     ("rps", 2.0 * PI, RATE, "", &[], &[]),
     ("m", 1.0, LENGTH, "munck", &[], &["metre", "metres", "meter", "meters"]),
     ("ft", 0.3048, LENGTH, "", &[], &["foot", "feet"]),
+    ("kt", 1852.0 / 3600.0, VELOCITY, "", &["kn"], &["knot", "knots"]),
     ("g", STANDARD_GRAVITY, FORCE, "mun", &["gee"], &[]),
     ("Gal", 0.01, FORCE, "mu", &[], &[]),
     ("s", 1.0, Dimension::TIME, "mun", &[], &["sec", "secs", "second", "seconds"]),
     ("min", 60.0, Dimension::TIME, "", &[], &["min", "mins", "minute", "minutes"]),
     ("h", 3600.0, Dimension::TIME, "", &[], &["hr", "hrs", "hour", "hours"]),
     ("Hz", 1.0, Dimension::FREQUENCY, "mkMG", &[], &["hz", "hertz"]),
+    ("kg", 1.0, Dimension::MASS, "", &[], &["kilogram", "kilograms"]),
+    ("N", 1.0, Dimension::FORCE, "mk", &[], &["newton", "newtons"]),
+    ("V", 1.0, Dimension::VOLTAGE, "mk", &[], &["volt", "volts"]),
+    ("A", 1.0, Dimension::CURRENT, "m", &[], &["amp", "amps", "ampere", "amperes"]),
+    ("ohm", 1.0, Dimension::RESISTANCE, "m", &["Ω", "Ω"], &["ohm", "ohms"]),
     ("K", 1.0, TEMPERATURE, "m", &[], &["kelvin"]),
     ("degC", 1.0, TEMPERATURE, "", &["℃"], &["degc", "celsius"]),
     ("degF", 5.0 / 9.0, TEMPERATURE, "", &["℉"], &["degf", "fahrenheit"]),

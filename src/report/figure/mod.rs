@@ -8,6 +8,8 @@ mod budget;
 mod chart;
 mod consistency;
 mod error;
+mod flight;
+mod lines;
 mod ratio;
 mod scale;
 mod sheet;
@@ -21,6 +23,8 @@ pub use consistency::{
     Autocorrelation, Histogram, Nees, Periodogram, autocorrelation, cumulative_periodogram, nees, nis_histogram,
 };
 pub use error::{Component, Errors, Rms, errors, rms};
+pub use flight::{Envelope, TimeLines, Track, time_lines, track};
+pub use lines::{Lines, lines};
 pub use ratio::{SpectrumRatio, spectrum_ratio};
 pub use sheet::sheet;
 pub use style::style_sheet;

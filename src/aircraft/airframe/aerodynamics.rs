@@ -1,0 +1,138 @@
+//! Forces and moments of the air by derivatives, with stall.
+//!
+//! α = atan2(w, u), β = asin(v/V), p̂ = bp/2V, q̂ = cq/2V, r̂ = br/2V. CL blends the linear lift CL0 + CLα α into that of a flat plate behind the stall
+//! (Beard and McLain 2012, section 4.2); drag is a parasitic part and one of the lift. Rotation into body axes by α alone, the side force in body axes.
+
+use std::f64::consts::PI;
+
+use super::{AirState, Controls, Size, Wrench};
+
+/// Derivatives of the lift.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Lift {
+    pub zero: f64,
+    pub alpha: f64,
+    pub pitch_rate: f64,
+    pub elevator: f64,
+}
+
+/// Of the pitching moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Pitch {
+    pub zero: f64,
+    pub alpha: f64,
+    pub pitch_rate: f64,
+    pub elevator: f64,
+}
+
+/// Of the side force, the rolling or the yawing moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Lateral {
+    pub zero: f64,
+    pub beta: f64,
+    pub p: f64,
+    pub r: f64,
+    pub aileron: f64,
+    pub rudder: f64,
+}
+
+/// The part of the drag that lift makes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Drag {
+    /// (CL0 + CLα α)²/(π e b²/S).
+    Oswald(f64),
+    /// k (CL − CL of least drag)² of the whole lift.
+    Polar { factor: f64, least: f64 },
+}
+
+/// Sharpness M and angle α0 (rad) of the blend σ = (1 + e₁ + e₂)/((1 + e₁)(1 + e₂)), e₁ = e^(−M(α − α0)), e₂ = e^(M(α + α0)).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stall {
+    pub sharpness: f64,
+    pub angle: f64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aerodynamics {
+    pub lift: Lift,
+    pub parasitic: f64,
+    pub drag: Drag,
+    pub drag_pitch_rate: f64,
+    pub drag_elevator: f64,
+    pub pitch: Pitch,
+    pub side: Lateral,
+    pub roll: Lateral,
+    pub yaw: Lateral,
+    /// Linear lift at every angle without it.
+    pub stall: Option<Stall>,
+}
+
+impl Stall {
+    /// 0 far below the stall, 1 far above.
+    pub fn blend(&self, alpha: f64) -> f64 {
+        let both = (self.sharpness * self.angle).exp();
+        let one = (self.sharpness * alpha).exp();
+        let (a, b) = (both / one, both * one);
+        // (1 + a + b)/((1 + a)(1 + b)) without products of large numbers
+        let (x, y) = (1.0 / (1.0 + a), 1.0 / (1.0 + b));
+        x + y - x * y
+    }
+}
+
+impl Lateral {
+    fn at(&self, beta: f64, p: f64, r: f64, controls: &Controls) -> f64 {
+        self.zero
+            + self.beta * beta
+            + self.p * p
+            + self.r * r
+            + self.aileron * controls.aileron
+            + self.rudder * controls.rudder
+    }
+}
+
+impl Aerodynamics {
+    /// CL and CD at an angle of attack (rad), a pitch rate q̂ and an elevator (rad).
+    pub fn lift_and_drag(&self, size: &Size, alpha: f64, q: f64, elevator: f64) -> (f64, f64) {
+        let linear = self.lift.zero + self.lift.alpha * alpha;
+        let steady = match &self.stall {
+            None => linear,
+            Some(stall) => {
+                let part = stall.blend(alpha);
+                let (sin, cos) = alpha.sin_cos();
+                (1.0 - part) * linear + part * 2.0 * alpha.signum() * sin * sin * cos
+            }
+        };
+        let lift = steady + self.lift.pitch_rate * q + self.lift.elevator * elevator;
+        let of_lift = match self.drag {
+            Drag::Oswald(e) => linear * linear / (PI * e * size.span * size.span / size.area),
+            Drag::Polar { factor, least } => factor * (lift - least) * (lift - least),
+        };
+        (lift, self.parasitic + of_lift + self.drag_pitch_rate * q + self.drag_elevator * elevator)
+    }
+
+    /// Of the air alone.
+    pub(super) fn forces(&self, size: &Size, air: &AirState, controls: &Controls, density: f64) -> Wrench {
+        let [u, v, w] = air.velocity;
+        let speed = (u * u + v * v + w * w).sqrt();
+        if speed == 0.0 {
+            return Wrench::default();
+        }
+        let (alpha, beta) = (w.atan2(u), (v / speed).asin());
+        let along = u.hypot(w);
+        let (sin, cos) = if along > 0.0 { (w / along, u / along) } else { (0.0, 1.0) };
+        let half = 0.5 / speed;
+        let [p, q, r] = [size.span, size.chord, size.span].map(|length| length * half);
+        let (p, q, r) = (p * air.rate[0], q * air.rate[1], r * air.rate[2]);
+        let (lift, drag) = self.lift_and_drag(size, alpha, q, controls.elevator);
+        let pitch = self.pitch.zero
+            + self.pitch.alpha * alpha
+            + self.pitch.pitch_rate * q
+            + self.pitch.elevator * controls.elevator;
+        let [side, roll, yaw] = [&self.side, &self.roll, &self.yaw].map(|d| d.at(beta, p, r, controls));
+        let pressure = 0.5 * density * speed * speed * size.area;
+        Wrench {
+            force: [pressure * (lift * sin - drag * cos), pressure * side, pressure * (-lift * cos - drag * sin)],
+            moment: [pressure * size.span * roll, pressure * size.chord * pitch, pressure * size.span * yaw],
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! The international standard atmosphere (ISO 2533:1975), troposphere and lower stratosphere.
+//!
+//! T = T0 − L H and p = p0 (T/T0)^(g0/(L R)) to 11 km of geopotential height H, above T constant and p = p11 e^(−g0 (H − 11 km)/(R T));
+//! ρ = p/(R T), a = √(γ R T).
+
+use super::AirError;
+
+/// Standard gravity, m/s².
+pub const GRAVITY: f64 = 9.80665;
+/// Specific gas constant of air, J/(kg K).
+pub const GAS_CONSTANT: f64 = 287.05287;
+/// Nominal radius of the earth for the geopotential height, m.
+const EARTH_RADIUS: f64 = 6_356_766.0;
+const RATIO_OF_HEATS: f64 = 1.4;
+const SEA_LEVEL_TEMPERATURE: f64 = 288.15;
+const SEA_LEVEL_PRESSURE: f64 = 101_325.0;
+/// K per metre.
+const LAPSE: f64 = 0.0065;
+const TROPOPAUSE: f64 = 11_000.0;
+const STRATOSPHERE_TEMPERATURE: f64 = SEA_LEVEL_TEMPERATURE - LAPSE * TROPOPAUSE;
+const PRESSURE_EXPONENT: f64 = GRAVITY / (LAPSE * GAS_CONSTANT);
+
+/// Geopotential heights of the tables of ISO 2533 that these two layers cover, m.
+pub const LOWEST: f64 = -2_000.0;
+pub const HIGHEST: f64 = 20_000.0;
+
+/// The air at rest at a height, SI.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Air {
+    pub temperature: f64,
+    pub pressure: f64,
+    pub density: f64,
+    pub sound_speed: f64,
+}
+
+/// Geopotential of a geometric height, H = r h/(r + h), m.
+pub fn geopotential(height: f64) -> f64 {
+    EARTH_RADIUS * height / (EARTH_RADIUS + height)
+}
+
+/// Air at a geopotential height, m. Errors: outside −2 to 20 km.
+pub fn at_geopotential(height: f64) -> Result<Air, AirError> {
+    if !(LOWEST..=HIGHEST).contains(&height) {
+        return Err(AirError(format!(
+            "altitude {height:.1} m (geopotential) is outside the standard atmosphere, which is known here from {LOWEST} m to {HIGHEST} m"
+        )));
+    }
+    Ok(layers(height))
+}
+
+/// Air at a geometric height, m. Errors: outside −2 to 20 km of geopotential height.
+pub fn at(height: f64) -> Result<Air, AirError> {
+    at_geopotential(geopotential(height))
+}
+
+fn layers(height: f64) -> Air {
+    let temperature = SEA_LEVEL_TEMPERATURE - LAPSE * height.min(TROPOPAUSE);
+    let mut pressure = SEA_LEVEL_PRESSURE * (temperature / SEA_LEVEL_TEMPERATURE).powf(PRESSURE_EXPONENT);
+    if height > TROPOPAUSE {
+        pressure *= (-GRAVITY * (height - TROPOPAUSE) / (GAS_CONSTANT * STRATOSPHERE_TEMPERATURE)).exp();
+    }
+    Air {
+        temperature,
+        pressure,
+        density: pressure / (GAS_CONSTANT * temperature),
+        sound_speed: (RATIO_OF_HEATS * GAS_CONSTANT * temperature).sqrt(),
+    }
+}

@@ -1,0 +1,5 @@
+//! Controllability, optimal gains and the `linear.json` document (floor 3).
+
+pub mod controllability;
+pub mod document;
+pub mod regulator;

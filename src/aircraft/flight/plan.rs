@@ -1,0 +1,322 @@
+//! A flight document with everything it names, in SI: what all runs of it share.
+
+use std::path::Path;
+
+use super::FlightError;
+use super::autopilot::{Gains, Reference};
+use super::commands::{self, Commands};
+use super::document::{EarthEntry, FlightDocument, GustEntry, WindEntry};
+use super::earth::{Earth, Geodetic};
+use super::motion::{State, World};
+use super::sensors::{Errors, three_axes};
+use super::start::{self, Start};
+use super::surfaces::CONTROLS;
+use super::vector::{Vector, back, dot, matrix, minus, times};
+use crate::aircraft::airframe::Airplane;
+use crate::aircraft::atmosphere::discrete::DiscreteGust;
+use crate::aircraft::atmosphere::dryden::{Dryden, Intensity};
+use crate::aircraft::atmosphere::standard;
+use crate::params::{Measured, Params};
+use crate::units::Quantity;
+
+/// Longest step of the integration when none is asked for, s: at 10 ms the error of 10 s is 1e-7 m, and gusts are followed to 0.3 %.
+pub const STEP: f64 = 0.0025;
+/// Samples per second without any sensor or autopilot, Hz.
+const RATE: f64 = 100.0;
+/// A time is a whole number of intervals if it is so to this part.
+const WHOLE: f64 = 1e-9;
+
+/// Times of a flight, s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Times {
+    pub duration: f64,
+    /// Between rows; every sample when absent.
+    pub every: Option<f64>,
+    /// Longest step of the integration; [`STEP`] when absent.
+    pub step: Option<f64>,
+}
+
+/// The grid that follows from them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Grid {
+    /// Samples per second.
+    pub rate: f64,
+    pub samples: u64,
+    /// Samples from one row to the next.
+    pub row: u64,
+    /// Steps of the integration in a sample.
+    pub steps: u64,
+}
+
+impl Grid {
+    pub(super) fn step(&self) -> f64 {
+        1.0 / (self.rate * self.steps as f64)
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct AutopilotPlan {
+    pub gains: Gains,
+    pub reference: Reference,
+    /// Samples from one command to the next.
+    pub every: u64,
+    /// s.
+    pub delay: f64,
+    pub filter: Option<f64>,
+}
+
+#[derive(Clone, Debug, Default)]
+pub(super) struct SensorPlan {
+    pub gyro: Option<Params>,
+    pub accelerometer: Option<Params>,
+    /// From the centre of gravity, body axes, m.
+    pub accelerometer_position: Vector,
+    pub attitude: Option<Errors>,
+    pub airspeed: Option<Errors>,
+    pub altitude: Option<Errors>,
+    pub gnss_position: Option<Errors>,
+    pub gnss_velocity: Option<Errors>,
+    pub gnss_antenna: Vector,
+}
+
+/// All of it; one plan serves many runs at once.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    pub(super) airplane: Airplane,
+    pub(super) earth: Earth,
+    pub(super) wind: Vector,
+    pub(super) start: State,
+    pub(super) commands: Commands,
+    pub(super) dryden: Vec<Dryden>,
+    pub(super) discrete: Vec<DiscreteGust>,
+    pub(super) sensors: SensorPlan,
+    pub(super) autopilot: Option<AutopilotPlan>,
+    pub(super) grid: Grid,
+}
+
+fn si(measured: &Option<Measured>) -> f64 {
+    measured.as_ref().map_or(0.0, Measured::si)
+}
+
+fn at(key: &str) -> impl Fn(String) -> FlightError {
+    let key = key.to_string();
+    move |message| FlightError(format!("{key}: {message}"))
+}
+
+impl Plan {
+    /// Reads what the document names from `folder` and checks that it fits together. Errors: one line with the key.
+    pub fn new(document: &FlightDocument, folder: &Path, times: &Times) -> Result<Plan, FlightError> {
+        let airplane = start::airplane(document, folder)?;
+        let earth = match document.earth {
+            EarthEntry::Flat => Earth::Flat,
+            EarthEntry::Wgs84(_) => Earth::Wgs84,
+        };
+        let wind =
+            document.wind.as_ref().map_or([0.0; 3], |WindEntry { north, east, down }| [north, east, down].map(si));
+        let Start { state, controls, reference, altitude } = start::start(document, &airplane, earth, wind)?;
+        standard::at(altitude).map_err(|e| at("altitude")(e.to_string()))?;
+        let world = World::new(&airplane, earth, wind);
+        let airspeed = airspeed(&world, &state);
+        let (dryden, discrete) = gusts(document, altitude, airspeed, airplane.size.span)?;
+        let sensors = &document.sensors;
+        let read = |key: &str, linked: &Option<super::document::Linked>, quantity: Quantity, what: &str| {
+            let key = format!("sensors.{key}");
+            let Some(linked) = linked else { return Ok(None) };
+            let (params, shown) = linked.params(&key, folder).map_err(FlightError)?;
+            three_axes(params, quantity.dimension(), what)
+                .map(Some)
+                .map_err(|e| FlightError(format!("{key}: {shown}: {e}")))
+        };
+        let gyro = read("gyro", &sensors.gyro, Quantity::AngularRate, "a gyro")?;
+        let accelerometer = read("accelerometer", &sensors.accelerometer, Quantity::SpecificForce, "an accelerometer")?;
+        let of_params = [&gyro, &accelerometer].into_iter().flatten().map(|params| params.sample_rate_hz).next();
+        let of_autopilot = document.autopilot.as_ref().map(|autopilot| autopilot.rate.si());
+        let given = sensors.rate.as_ref().map(Measured::si).or(of_params).or(of_autopilot);
+        let any = gyro.is_some()
+            || accelerometer.is_some()
+            || [&sensors.attitude, &sensors.airspeed, &sensors.altitude].iter().any(|e| e.is_some())
+            || sensors.gnss.is_some();
+        let grid = grid(times, given.or(any.then_some(RATE)))?;
+        let errors = |key: &str, entry: &Option<super::document::ErrorEntry>, own: Option<f64>| {
+            let errors = entry.as_ref().map(|entry| Errors::new(entry, own, grid.rate));
+            errors.transpose().map_err(at(&format!("sensors.{key}")))
+        };
+        let gnss = sensors.gnss.as_ref();
+        let own = gnss.and_then(|gnss| gnss.rate.as_ref()).map(Measured::si);
+        let sensors = SensorPlan {
+            attitude: errors("attitude", &sensors.attitude, None)?,
+            airspeed: errors("airspeed", &sensors.airspeed, None)?,
+            altitude: errors("altitude", &sensors.altitude, None)?,
+            gnss_position: errors("gnss.position", &gnss.and_then(|g| g.position.clone()), own)?,
+            gnss_velocity: errors("gnss.velocity", &gnss.and_then(|g| g.velocity.clone()), own)?,
+            gyro,
+            accelerometer,
+            accelerometer_position: airplane.position("accelerometer"),
+            gnss_antenna: airplane.position("gnss"),
+        };
+        let commands = commands::read(&document.controls, folder, controls, times.duration)?;
+        let [elevator, aileron, rudder, _] = commands.fixed;
+        let reference = Reference { surfaces: [elevator, aileron, rudder], ..reference };
+        let autopilot = autopilot(document, reference, &grid, sensors.attitude.is_some())?;
+        if autopilot.is_some() && commands.rows.iter().any(|(_, row)| row[..3] != commands.fixed[..3]) {
+            return Err(FlightError(
+                "controls.file: moves a surface that the autopilot moves; leave one of them out".into(),
+            ));
+        }
+        start::check_travel(&airplane, &commands)?;
+        let plan = Plan { airplane, earth, wind, start: state, commands, dryden, discrete, sensors, autopilot, grid };
+        plan.check_step()?;
+        Ok(plan)
+    }
+
+    pub(super) fn world(&self) -> World<'_> {
+        World::new(&self.airplane, self.earth, self.wind)
+    }
+
+    /// Seconds between two steps of the integration.
+    pub fn step(&self) -> f64 {
+        self.grid.step()
+    }
+
+    /// Seconds from the start to the last row.
+    pub fn duration(&self) -> f64 {
+        self.grid.samples as f64 / self.grid.rate
+    }
+
+    pub(super) fn initial_commands(&self) -> [f64; CONTROLS] {
+        self.commands.at_start()
+    }
+}
+
+/// Through the steady air.
+fn airspeed(world: &World<'_>, x: &State) -> f64 {
+    let c = matrix(super::motion::attitude(x));
+    let wind = back(&c, world.earth.of_local(super::motion::position(x), world.wind));
+    let v = minus(super::motion::velocity(x), wind);
+    dot(v, v).sqrt()
+}
+
+fn gusts(
+    document: &FlightDocument,
+    altitude: f64,
+    speed: f64,
+    span: f64,
+) -> Result<(Vec<Dryden>, Vec<DiscreteGust>), FlightError> {
+    let (mut dryden, mut discrete) = (Vec::new(), Vec::new());
+    for (i, gust) in document.gusts.iter().enumerate() {
+        match gust {
+            GustEntry::Dryden { specification, wind_at_20ft, std_dev, height, airspeed } => {
+                let height = height.as_ref().map_or(altitude, Measured::si);
+                let intensity = Intensity {
+                    wind_at_20ft: wind_at_20ft.as_ref().map(Measured::si),
+                    std_dev_aloft: std_dev.as_ref().map(Measured::si),
+                };
+                let speed = airspeed.as_ref().map_or(speed, Measured::si);
+                let gust = Dryden::new(*specification, height, intensity, speed, span);
+                dryden.push(gust.map_err(|e| at(&format!("gusts[{i}]"))(e.to_string()))?);
+            }
+            GustEntry::Discrete { form, length, u, v, w, start } => discrete.push(DiscreteGust {
+                form: *form,
+                velocity: [u, v, w].map(si),
+                length: length.si(),
+                start: si(start),
+            }),
+        }
+    }
+    Ok((dryden, discrete))
+}
+
+/// `count` if a number is whole to [`WHOLE`].
+fn whole(number: f64) -> Option<u64> {
+    let count = number.round();
+    (count >= 1.0 && (number / count - 1.0).abs() <= WHOLE).then_some(count as u64)
+}
+
+/// `given`: samples per second that sensors or the autopilot ask for.
+fn grid(times: &Times, given: Option<f64>) -> Result<Grid, FlightError> {
+    let positive = |name: &str, time: f64| {
+        if time.is_finite() && time > 0.0 {
+            Ok(())
+        } else {
+            Err(FlightError(format!("{name} {time} s: expected a positive time")))
+        }
+    };
+    positive("duration", times.duration)?;
+    times.every.map_or(Ok(()), |every| positive("every", every))?;
+    times.step.map_or(Ok(()), |step| positive("step", step))?;
+    // without sensors the rows alone ask for samples
+    let free = times.every.filter(|every| whole(times.duration / every).is_some()).map_or(RATE, |every| 1.0 / every);
+    let rate = given.unwrap_or(free);
+    let Some(samples) = whole(times.duration * rate) else {
+        return Err(FlightError(format!(
+            "duration {} s is no whole number of samples at {rate} Hz; take a multiple of {} s",
+            times.duration,
+            1.0 / rate
+        )));
+    };
+    let every = times.every.unwrap_or(1.0 / rate);
+    let Some(row) = whole(every * rate) else {
+        return Err(FlightError(format!(
+            "every {every} s is no whole number of samples at {rate} Hz; take a multiple of {} s",
+            1.0 / rate
+        )));
+    };
+    let steps = (1.0 / (rate * times.step.unwrap_or(STEP)) * (1.0 - WHOLE)).ceil().max(1.0);
+    Ok(Grid { rate, samples, row, steps: steps as u64 })
+}
+
+fn autopilot(
+    document: &FlightDocument,
+    mut reference: Reference,
+    grid: &Grid,
+    measured: bool,
+) -> Result<Option<AutopilotPlan>, FlightError> {
+    let Some(entry) = &document.autopilot else { return Ok(None) };
+    let rate = entry.rate.si();
+    let every = whole(grid.rate / rate).ok_or_else(|| {
+        FlightError(format!("autopilot.rate: {rate} Hz is no whole fraction of the {} Hz of the sensors", grid.rate))
+    })?;
+    if let Some(bank) = &entry.bank {
+        reference.angles[0] = bank.si();
+    }
+    if let Some(pitch) = &entry.pitch {
+        reference.angles[1] = pitch.si();
+    }
+    let gains = &entry.gains;
+    Ok(Some(AutopilotPlan {
+        gains: Gains {
+            kq: gains.kq.si(),
+            ktheta: gains.ktheta,
+            kp: gains.kp.si(),
+            kphi: gains.kphi,
+            kr: gains.kr.si(),
+            washout: gains.washout.as_ref().map_or(1.0, Measured::si),
+        },
+        reference,
+        every,
+        delay: entry.delay as f64 / rate,
+        filter: measured.then(|| entry.attitude_filter.as_ref().map_or(5.0, Measured::si)),
+    }))
+}
+
+/// A place and the attitude there as a state; `velocity` and `rate` in body axes, relative to the earth.
+pub(super) fn state(earth: Earth, place: Geodetic, euler: Vector, velocity: Vector, rate: Vector) -> State {
+    let r = match earth {
+        Earth::Flat => [0.0, 0.0, -place.height],
+        Earth::Wgs84 => place.to_ecef(),
+    };
+    let attitude = earth.attitude(r, &super::vector::from_euler(euler));
+    let c = matrix(attitude);
+    let inertial = super::vector::plus(rate, back(&c, earth.field(r).rate));
+    let [a, b, d] = [r, velocity, inertial];
+    let e = attitude;
+    [a[0], a[1], a[2], b[0], b[1], b[2], e[0], e[1], e[2], e[3], d[0], d[1], d[2], 0.0]
+}
+
+/// Where a point of the airplane is and how it moves, north, east, down from the start.
+pub(super) fn point(plan: &Plan, x: &State, rate: Vector, arm: Vector) -> (Vector, Vector) {
+    let c = matrix(super::motion::attitude(x));
+    let r = super::motion::position(x);
+    let v = super::vector::plus(super::motion::velocity(x), super::vector::cross(rate, arm));
+    (super::vector::plus(r, times(&c, arm)), times(&plan.earth.local(r), times(&c, v)))
+}

@@ -1,0 +1,199 @@
+//! One flight from its start to its last row.
+
+use super::FlightError;
+use super::air::MovingAir;
+use super::autopilot::Autopilot;
+use super::motion::{Instant, State, World, attitude, step};
+use super::plan::Plan;
+use super::rows::{Measurements, Row};
+use super::start::servo_of;
+use super::surfaces::{SAME_TIME, Surface, Surfaces};
+use super::vector::to_euler;
+use crate::aircraft::airframe::Controls;
+use crate::aircraft::atmosphere::{AirError, Gust};
+use crate::numerics::linalg::eigenvalues;
+use nalgebra::DMatrix;
+
+/// Real part of λh down to which the Runge–Kutta method of order 4 is stable (Hairer and Wanner 1996, section IV.2).
+const STABLE: f64 = 2.785;
+
+/// An airplane under way.
+struct Flying<'a> {
+    plan: &'a Plan,
+    world: World<'a>,
+    x: State,
+    surfaces: Surfaces,
+    air: MovingAir,
+    /// First of the rows of commands that is not ordered yet.
+    next_command: usize,
+}
+
+impl Plan {
+    /// Flies run number `run` and hands out the rows in order. Errors: the airplane leaves the standard atmosphere, the integration becomes unstable, or what
+    /// `row` says.
+    pub(super) fn fly<E: From<FlightError>>(
+        &self,
+        seed: u64,
+        run: u64,
+        mut row: impl FnMut(&Row) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let mut flying = Flying::new(self, seed, run)?;
+        let mut measurements = Measurements::new(self, seed, run)?;
+        let euler = flying.euler();
+        let mut autopilot = self.autopilot.map(|a| {
+            Autopilot::new(a.gains, a.reference, a.every as f64 / self.grid.rate, a.filter, [euler[0], euler[1]])
+        });
+        for sample in 0..=self.grid.samples {
+            let time = sample as f64 / self.grid.rate;
+            flying.surfaces.receive(time);
+            flying.air.begin(time, flying.x[13]);
+            let gust = flying.air.gust(0.0, flying.x[13]);
+            let instant = flying.instant(time, &gust)?;
+            let measured = measurements.take(self, sample, &flying.x, &instant);
+            if let (Some(autopilot), Some(plan)) = (&mut autopilot, &self.autopilot)
+                && sample.is_multiple_of(plan.every)
+            {
+                let command = autopilot.command(measured.gyro, [measured.attitude[0], measured.attitude[1]]);
+                for (surface, command) in flying.surfaces.0.iter_mut().zip(command) {
+                    surface.order(time + plan.delay, command);
+                }
+            }
+            if sample.is_multiple_of(self.grid.row) || sample == self.grid.samples {
+                row(&Row::new(self, time, &flying.x, &instant, &flying.surfaces, &gust, &measured))?;
+            }
+            if sample < self.grid.samples {
+                flying.advance(sample)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The linear motion about the start is one that the step can follow. Errors: it is not, with the step.
+    pub(super) fn check_step(&self) -> Result<(), FlightError> {
+        let world = self.world();
+        let [elevator, aileron, rudder, throttle] = self.initial_commands();
+        let controls = Controls { elevator, aileron, rudder, throttle };
+        let rate = |x: &State| world.instant(x, &controls, &Gust::default());
+        let at = rate(&self.start).map_err(|e| FlightError(format!("at the start: {e}")))?.derivative;
+        // velocity and rate are where fast modes live; a millionth of their size is small against what is not linear
+        let fast = [3, 4, 5, 10, 11, 12];
+        let mut jacobian = DMatrix::zeros(6, 6);
+        for (j, &state) in fast.iter().enumerate() {
+            let by = 1e-6 * if state < 10 { self.start[3].abs().max(1.0) } else { 1.0 };
+            let mut x = self.start;
+            x[state] += by;
+            let moved = rate(&x).map_err(|e| FlightError(format!("at the start: {e}")))?.derivative;
+            for (i, &row) in fast.iter().enumerate() {
+                jacobian[(i, j)] = (moved[row] - at[row]) / by;
+            }
+        }
+        let fastest = eigenvalues(&jacobian).into_iter().map(|(re, im)| re.hypot(im)).fold(0.0, f64::max);
+        let h = self.step();
+        if fastest * h > STABLE {
+            return Err(FlightError(format!(
+                "a step of {h} s is too long for this airplane, whose fastest mode has {fastest:.1} rad/s: the integration would be unstable; \
+                 give --step {:.1e} s or less",
+                1.0 / fastest
+            )));
+        }
+        Ok(())
+    }
+}
+
+impl<'a> Flying<'a> {
+    fn new(plan: &'a Plan, seed: u64, run: u64) -> Result<Flying<'a>, FlightError> {
+        let commands = plan.initial_commands();
+        let surface = |i: usize| {
+            let (servo, delay) = servo_of(&plan.airplane, i);
+            Surface::new(servo, delay, commands[i])
+        };
+        let air = MovingAir::new(&plan.dryden, &plan.discrete, plan.step(), seed, run)
+            .map_err(|e| FlightError(format!("gusts: {e}")))?;
+        let next_command = plan.commands.rows.iter().take_while(|(time, _)| *time <= 0.0).count();
+        Ok(Flying {
+            plan,
+            world: plan.world(),
+            x: plan.start,
+            surfaces: Surfaces(std::array::from_fn(surface)),
+            air,
+            next_command,
+        })
+    }
+
+    fn euler(&self) -> [f64; 3] {
+        to_euler(&self.plan.earth.body_to_local(super::motion::position(&self.x), attitude(&self.x)))
+    }
+
+    fn instant(&self, time: f64, gust: &Gust) -> Result<Instant, FlightError> {
+        self.world.instant(&self.x, &self.surfaces.controls(), gust).map_err(|e| self.outside(time, &e))
+    }
+
+    fn outside(&self, time: f64, error: &AirError) -> FlightError {
+        if self.unsteady() {
+            return self.unstable(time);
+        }
+        FlightError(format!("at {time:.3} s: {error}"))
+    }
+
+    /// Rotation of more than a radian in a step cannot be followed by it.
+    fn unsteady(&self) -> bool {
+        let turn = self.x[10..13].iter().fold(0.0_f64, |m, w| m.max(w.abs())) * self.plan.step();
+        turn > 1.0 || self.x.iter().any(|x| !x.is_finite())
+    }
+
+    fn unstable(&self, time: f64) -> FlightError {
+        FlightError(format!(
+            "at {time:.3} s: the integration is unstable with its step of {} s; give a shorter one with --step",
+            self.plan.step()
+        ))
+    }
+
+    /// Over one sample, in steps that are cut where a command arrives or a discrete gust begins.
+    fn advance(&mut self, sample: u64) -> Result<(), FlightError> {
+        let grid = &self.plan.grid;
+        let h = grid.step();
+        let start = sample as f64 / grid.rate;
+        let end = (sample + 1) as f64 / grid.rate;
+        while let Some((time, row)) = self.plan.commands.rows.get(self.next_command).filter(|(time, _)| *time <= end) {
+            // the autopilot moves the surfaces, the file then the throttle
+            let moved = if self.plan.autopilot.is_some() { 3 } else { 0 };
+            let controls = self.surfaces.0.iter_mut().zip(row).skip(moved);
+            controls.for_each(|(surface, command)| surface.order(*time, *command));
+            self.next_command += 1;
+        }
+        for i in 0..grid.steps {
+            let (from, to) = (start + i as f64 * h, if i + 1 == grid.steps { end } else { start + (i + 1) as f64 * h });
+            let mut now = from;
+            while now < to - SAME_TIME {
+                self.surfaces.receive(now);
+                self.air.begin(now, self.x[13]);
+                let cuts = [self.surfaces.next_arrival(now, to), self.air.next_begin(now, to)];
+                let next = cuts.into_iter().flatten().fold(to, f64::min);
+                self.piece(now, next - now, (now - from) / h, (next - from) / h)?;
+                now = next;
+            }
+            self.air.step();
+        }
+        if self.unsteady() {
+            return Err(self.unstable(end));
+        }
+        Ok(())
+    }
+
+    /// A step with `parts`: where in the step of the turbulence it begins and ends.
+    fn piece(&mut self, now: f64, h: f64, first: f64, last: f64) -> Result<(), FlightError> {
+        let mut controls = [self.surfaces.controls(); 3];
+        for controls in controls.iter_mut().skip(1) {
+            self.surfaces.advance(0.5 * h);
+            *controls = self.surfaces.controls();
+        }
+        let parts = [first, 0.5 * (first + last), last];
+        let (world, air) = (&self.world, &self.air);
+        let rate = |stage: usize, x: &State| {
+            let gust = air.gust(parts[stage], x[13]);
+            world.instant(x, &controls[stage], &gust).map(|instant| instant.derivative)
+        };
+        self.x = step(&self.x, h, rate).map_err(|e| self.outside(now, &e))?;
+        Ok(())
+    }
+}

@@ -1,0 +1,11 @@
+//! The airplane: its air, its motion, what it measures. Numbers named "the sheet's" come from a second implementation of the same equations.
+
+mod atmosphere;
+mod command;
+mod flights;
+mod fly;
+mod linear;
+mod servo;
+mod steady;
+mod streams;
+mod turbulence;

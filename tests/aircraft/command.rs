@@ -1,0 +1,136 @@
+//! `kfdesign fly` as a user has it: logs that other commands read, and what is refused.
+
+use serde_json::{Value, json};
+
+use super::flights::level;
+use crate::support::{Bench, data};
+
+fn document() -> Value {
+    let mut document = level();
+    document["airplane"] = json!(data("airplanes/aerosonde.json"));
+    document["gusts"] = json!({ "model": "dryden", "specification": "MIL-F-8785C", "wind_at_20ft": "15 kt" });
+    document["sensors"] = json!({ "gyro": data("params.json"), "accelerometer": {
+        "format": "kfdesign-params/1", "quantity": "specific-force", "sample_rate": "100 Hz",
+        "axes": [{ "name": "x", "white": { "density": "0.002 m/s^2/sqrt(Hz)" } }]
+    } });
+    document["autopilot"] = json!({
+        "rate": "100 Hz", "delay": 1,
+        "gains": { "kq": "0.2 s", "ktheta": 0.6, "kp": "0.06 s", "kphi": 0.6, "kr": "0.15 s", "washout": "1 s" }
+    });
+    document
+}
+
+fn bench() -> Bench {
+    let bench = Bench::new();
+    bench.file("flight.json", document().to_string());
+    bench
+}
+
+#[test]
+fn the_log_is_one_that_the_other_commands_read() {
+    let bench = bench();
+    let params = data("params.json").display().to_string();
+    bench.ok("fly flight.json -o flight.csv --duration 120s");
+    bench.ok("identify flight.csv --columns gyro_x,gyro_y,gyro_z --method allan -o found.json");
+    bench.ok("identify flight.csv --columns accel_x,accel_y,accel_z --method allan -o found-accel.json");
+    bench.ok(&format!("tune {params} -o filter.json"));
+    // a gyro in flight is not the gyro at rest: both verdicts may be against it, but they are verdicts
+    for command in [
+        "replay filter.json flight.csv --columns gyro_x,gyro_y,gyro_z --json".to_string(),
+        format!("compare {params} flight.csv --columns gyro_x,gyro_y,gyro_z --json"),
+        format!("inflate {params} flight.csv --columns gyro_x,gyro_y,gyro_z -o loud.json --json"),
+    ] {
+        let out = bench.run(&command);
+        assert!(out.status < 2, "{command}: {out:?}");
+    }
+}
+
+#[test]
+fn every_format_holds_the_same_rows_and_runs_have_files_of_their_own() {
+    let bench = bench();
+    for name in ["a.csv", "b.csv.gz", "c.npy"] {
+        bench.ok(&format!("fly flight.json -o {name} --duration 1s --seed 5"));
+    }
+    let text = bench.read("a.csv");
+    assert_eq!(text.lines().count(), 102);
+    assert!(text.starts_with("time (s),north (m),east (m),down (m),u (m/s),v (m/s),w (m/s),phi (rad),theta (rad),psi (rad),p (rad/s),q (rad/s),r (rad/s),elevator (rad),aileron (rad),rudder (rad),throttle,gust_u (m/s)"));
+    assert!(text.lines().last().unwrap().starts_with("1,"));
+    let report: Value =
+        serde_json::from_str(&bench.ok("fly flight.json -o r.csv --duration 1s --seed 5 --runs 3 --json")).unwrap();
+    assert_eq!(report["format"], "kfdesign-fly/1");
+    assert_eq!(report["runs"].as_array().unwrap().len(), 3);
+    assert_eq!(report["runs"][2]["log"], "r-2.csv");
+    assert!(bench.read("r-0.csv") == text && bench.read("r-1.csv") != text);
+    let rows = bench.ok("fly flight.json --duration 1s --every 0.25s --json");
+    assert!(rows.contains("\"rows\": 5"));
+}
+
+#[test]
+fn what_cannot_be_flown_is_refused_in_one_line() {
+    let change = |key: &str, value: Value| {
+        let mut document = document();
+        document[key] = value;
+        document
+    };
+    let trim = |altitude: &str, airspeed: &str| change("trim", json!({ "airspeed": airspeed, "altitude": altitude }));
+    let mut quiet = document();
+    quiet.as_object_mut().unwrap().remove("autopilot");
+    let dryden = |more: Value| {
+        let mut gust = json!({ "model": "dryden", "specification": "MIL-F-8785C", "wind_at_20ft": "15 kt" });
+        gust.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        change("gusts", gust)
+    };
+    let rows: Vec<(Value, &str, &[&str])> = vec![
+        (trim("25 km", "25 m/s"), "", &["flight.json: trim:", "altitude 24902", "-2000 m to 20000 m"]),
+        (trim("100 m", "25"), "", &["trim.airspeed", "\"25\""]),
+        (trim("100 m", "25 deg"), "", &["trim.airspeed", "expected a velocity"]),
+        (trim("100 m", "10 m/s"), "", &["no lift", "stalls at"]),
+        (trim("100 m", "45 m/s"), "", &["no thrust", "a throttle of"]),
+        (trim("100 m", "16 m/s"), "", &["no elevator", "the stops are"]),
+        (dryden(json!({ "height": "2 m" })), "", &["gusts[0]", "from 10 ft"]),
+        (dryden(json!({ "height": "500 m" })), "", &["gusts[0]", "std_dev"]),
+        (dryden(json!({ "specification": "MIL-F-8785B" })), "", &["gusts.specification", "MIL-F-8785C, MIL-HDBK-1797"]),
+        (change("gusts", json!({ "model": "von Karman" })), "", &["gusts.model", "known are dryden, 1-cos"]),
+        (change("earth", json!("round")), "", &["earth", "known are flat, wgs84"]),
+        (change("earth", json!({ "wgs84": {} })), "", &["earth.wgs84.latitude", "missing"]),
+        (change("controls", json!({ "elevator": "30 deg" })), "", &["controls.elevator", "beyond the stops"]),
+        (change("controls", json!({ "throttle": 1.5 })), "", &["controls.throttle", "expected 0 to 1"]),
+        (change("control", json!({})), "", &["unknown key", "did you mean 'controls'"]),
+        (change("airplane", json!("none.json")), "", &["airplane", "none.json", "cannot read"]),
+        (change("controls", json!("none.csv")), "", &["none.csv", "cannot read"]),
+        (quiet.clone(), "--duration 1.003s", &["duration 1.003 s is no whole number of samples at 100 Hz"]),
+        (quiet.clone(), "--every 3ms", &["every 0.003 s"]),
+        (quiet.clone(), "--duration -1s", &["duration -1 s: expected a positive time"]),
+        (
+            {
+                quiet.as_object_mut().unwrap().remove("sensors");
+                quiet.clone()
+            },
+            "--duration 10s --every 1s --step 0.5s",
+            &["a step of 0.5 s", "give --step"],
+        ),
+    ];
+    for (document, flags, words) in rows {
+        let bench = Bench::new();
+        bench.file("flight.json", document.to_string());
+        let out = bench.run(&format!("fly flight.json -o out.csv {flags}"));
+        assert_eq!(out.status, 2, "{document}\n{out:?}");
+        assert_eq!(out.stderr.lines().count(), 1, "{out:?}");
+        assert!(words.iter().all(|word| out.stderr.contains(word)), "{words:?}\n{out:?}");
+        assert_eq!(bench.files(), ["flight.json"]);
+    }
+}
+
+/// Rows are only written while the airplane is in the standard atmosphere; a dive out of it says when.
+#[test]
+fn leaving_the_atmosphere_is_said_with_its_time() {
+    let bench = Bench::new();
+    let mut dive = level();
+    dive["airplane"] = json!(data("airplanes/aerosonde.json"));
+    dive["initial"] = json!({ "altitude": "-1900 m", "u": "30 m/s", "theta": "-60 deg" });
+    bench.file("flight.json", dive.to_string());
+    let out = bench.run("fly flight.json -o out.csv --duration 60s");
+    assert_eq!(out.status, 2);
+    assert!(out.stderr.contains("at ") && out.stderr.contains("outside the standard atmosphere"), "{out:?}");
+    assert_eq!(bench.files(), ["flight.json"]);
+}

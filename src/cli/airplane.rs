@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::Status;
+use super::files::{self, Kind};
 use super::flags::with_unit;
 use super::output::{digits, print_json, print_text, table};
 use crate::aircraft::airframe::Airplane;
@@ -31,18 +32,16 @@ pub struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
-    if let Some(plot) = &args.plot {
-        atomic::check_output(plot, &args.airplane)?;
-    }
+    files::check(&[("--plot", &args.plot, Kind::Svg)], &[&args.airplane])?;
     let altitude = with_unit("--altitude", &args.altitude, Dimension::new(0, 2, 0), "100 m")?;
     let check = Airplane::read(&args.airplane)?.check(altitude)?;
     if let Some(path) = &args.plot {
         atomic::write(path, figures(&check).as_bytes())?;
     }
     if args.json {
-        print_json(&check)?
+        print_json(&check)?;
     } else {
-        print_text(&text(&check))?
+        print_text(&text(&check));
     }
     Ok(Status::Done)
 }

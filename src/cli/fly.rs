@@ -8,8 +8,9 @@ use std::sync::Mutex;
 use anyhow::bail;
 
 use super::Status;
+use super::files::{self, Kind};
 use super::flags::{whole, with_unit};
-use super::output::{digits, print_json, print_text, refuse_same_output, table};
+use super::output::{digits, print_json, print_text, table};
 use crate::aircraft::flight::{FlightDocument, FlightReport, Plan, RowSink, Times, fly};
 use crate::export::atomic;
 use crate::export::table::TableWriter;
@@ -83,10 +84,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if args.runs == 0 {
         bail!("--runs 0: expected at least one run");
     }
-    if let Some(output) = &args.output {
-        atomic::refuse_input_as_output(output, &args.flight)?;
-    }
-    refuse_same_output(&[("-o", &args.output), ("--plot", &args.plot)])?;
+    files::check(&[("-o", &args.output, Kind::Table), ("--plot", &args.plot, Kind::Svg)], &[&args.flight])?;
     let time = |flag: &str, text: &str| with_unit(flag, text, Dimension::TIME, "10s");
     let times = Times {
         duration: time("--duration", &args.duration)?,
@@ -109,9 +107,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         atomic::write(path, figures.as_bytes())?;
     }
     if args.json {
-        print_json(&report)?
+        print_json(&report)?;
     } else {
-        print_text(&text(&report))?
+        print_text(&text(&report));
     }
     Ok(Status::Done)
 }

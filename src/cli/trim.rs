@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow, bail};
 
 use super::Status;
+use super::files::{self, Kind};
 use super::flags::with_unit;
-use super::output::{digits, print_json, print_text, refuse_same_output, table};
+use super::output::{digits, print_json, print_text, table};
 use crate::aircraft::airframe::Airplane;
 use crate::aircraft::airframe::trim::{Sideways, TrimRequest, Turn};
 use crate::aircraft::control::document::{CriterionDocument, LinearDocument, Linearized, ModeDocument};
@@ -60,10 +61,7 @@ pub struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
-    refuse_same_output(&[("-o", &args.output), ("--report", &args.report)])?;
-    for output in [&args.output, &args.report].into_iter().flatten() {
-        atomic::check_output(output, &args.file)?;
-    }
+    files::check(&[("-o", &args.output, Kind::Json), ("--report", &args.report, Kind::Html)], &[&args.file])?;
     if let Some(scale) = args.froude.filter(|n| !(*n > 0.0 && n.is_finite())) {
         bail!("--froude {scale}: expected a positive number, full size over model");
     }
@@ -82,9 +80,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         atomic::write(path, page::page(&linearized, &document).to_html()?.as_bytes())?;
     }
     if args.json {
-        print_json(&document)?
+        print_json(&document)?;
     } else {
-        print_text(&text(&document))?
+        print_text(&text(&document));
     }
     Ok(Status::Done)
 }

@@ -71,8 +71,8 @@ const SPELLINGS: &[(&str, f64, Dimension)] = &[
     ("s", 1.0, TIME), ("sec", 1.0, TIME), ("ms", 1e-3, TIME), ("us", 1e-6, TIME), ("µs", 1e-6, TIME), ("ns", 1e-9, TIME), ("min", 60.0, TIME), ("h", 3600.0, TIME),
     ("hr", 3600.0, TIME), ("Hz", 1.0, FREQUENCY), ("kHz", 1e3, FREQUENCY), ("1/s", 1.0, FREQUENCY), ("s^-1", 1.0, FREQUENCY), ("1/ms", 1e3, FREQUENCY),
     ("degF", 5.0 / 9.0, Dimension::TEMPERATURE), ("°F", 5.0 / 9.0, Dimension::TEMPERATURE), ("deg/s/degC", DEG, RATE.per_temperature()),
-    ("degC", 1.0, Dimension { angle: 0, length: 0, time: 0, temperature: 2 }), ("°C", 1.0, Dimension { angle: 0, length: 0, time: 0, temperature: 2 }),
-    ("K", 1.0, Dimension { angle: 0, length: 0, time: 0, temperature: 2 }), ("1", 1.0, Dimension::NONE),
+    ("degC", 1.0, Dimension::TEMPERATURE), ("°C", 1.0, Dimension::TEMPERATURE),
+    ("K", 1.0, Dimension::TEMPERATURE), ("1", 1.0, Dimension::NONE),
     ("(deg/s)^2/Hz", DEG * DEG, Dimension::new(4, 0, -2)),
 ];
 

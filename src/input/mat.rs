@@ -209,9 +209,8 @@ fn walk(
         return Ok(walker.objects);
     }
     let mut inflated = Metered { inner: ZlibDecoder::new(stored), account: account.clone() };
-    match (word(&mut inflated, big_endian)?, word(&mut inflated, big_endian)?) {
-        (MATRIX, size) => walker.matrix(&mut (&mut inflated as &mut dyn Read).take(u64::from(size)), "", 0)?,
-        _ => {}
+    if let (MATRIX, size) = (word(&mut inflated, big_endian)?, word(&mut inflated, big_endian)?) {
+        walker.matrix(&mut (&mut inflated as &mut dyn Read).take(u64::from(size)), "", 0)?;
     }
     Ok(walker.objects)
 }

@@ -183,13 +183,16 @@ pub(super) fn open(path: &Path, account: &Account) -> Result<RecordSource, Input
     Ok(RecordSource { format: "PX4 ULog", path, account, topics, messages: Box::new(messages) })
 }
 
-/// The fields of a format, those inside others too: name, first byte, number of values, type.
+/// Name, first byte, type.
+type Field = (String, usize, Number);
+
+/// The fields of a format, those inside others too.
 fn flatten(
     format: &str,
     formats: &BTreeMap<String, String>,
     depth: usize,
     account: &Account,
-) -> Result<Option<Vec<(String, usize, Number)>>, Excess> {
+) -> Result<Option<Vec<Field>>, Excess> {
     let mut fields = Vec::new();
     let mut at = 0;
     let Some(format) = formats.get(format) else { return Ok(None) };

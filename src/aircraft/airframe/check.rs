@@ -203,7 +203,7 @@ impl Airplane {
             ("yaw.rudder", a.yaw.rudder, false, "the rudder is positive trailing edge left"),
         ] {
             let right = if positive { value > 0.0 } else { value < 0.0 };
-            if !right && !(value == 0.0 && name.starts_with("yaw.rudder")) {
+            if !right && (value != 0.0 || name != "yaw.rudder") {
                 let usual = if positive { "above" } else { "below" };
                 out.push(format!("aerodynamics.{name} {value} is usually {usual} zero: {meaning}"));
             }

@@ -25,6 +25,9 @@ pub enum Category {
 
 pub const CATEGORIES: [Category; 3] = [Category::A, Category::B, Category::C];
 
+/// Name, unit, value, level and why not, of a criterion.
+type Judged = (&'static str, &'static str, Option<f64>, Option<u8>, Option<String>);
+
 impl Category {
     pub fn name(self) -> &'static str {
         match self {
@@ -101,8 +104,7 @@ impl Measures {
         }
     }
 
-    /// Name, unit, value, level and why not, of every criterion.
-    fn judged(&self, category: Category) -> Vec<(&'static str, &'static str, Option<f64>, Option<u8>, Option<String>)> {
+    fn judged(&self, category: Category) -> Vec<Judged> {
         use Category::{A, B, C};
         let infinite = f64::INFINITY;
         let missing = |mode: &str| Some(format!("the airplane has no {mode} mode here"));

@@ -48,8 +48,11 @@ pub(super) fn sheet(airplane: &str, header: &[String], lines: &Envelope, stops: 
     figure::sheet(&format!("Flight of {airplane}"), &figures)
 }
 
+/// Time and value.
+type Points = Vec<(f64, f64)>;
+
 /// Over the ground, from both coordinates at equal times.
-fn way(line: &dyn Fn(&str) -> Option<Vec<(f64, f64)>>) -> Option<String> {
+fn way(line: &dyn Fn(&str) -> Option<Points>) -> Option<String> {
     let flat = line("north").zip(line("east"));
     let (north, east, per) = match flat {
         Some((north, east)) => (north, east, [1.0, 1.0]),

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::Axis;
 use crate::cli::Status;
+use crate::cli::output::say;
 use crate::params::{Check, Params};
 use crate::signal::LogCheck;
 
@@ -34,6 +35,6 @@ pub(super) fn checks(logs: &[LogCheck], axes: &[Axis]) -> Vec<Check> {
 pub(super) fn status(params: &Params, output: Option<&Path>) -> Status {
     let Some(failed) = params.failed_check() else { return Status::Done };
     let kept = output.map_or_else(String::new, |path| format!(", kept in {}", path.display()));
-    eprintln!("check failed: {failed} (exit status 1{kept})");
+    say(&format!("check failed: {failed} (exit status 1{kept})"));
     Status::CheckFailed
 }

@@ -184,7 +184,7 @@ pub(super) fn open(path: &Path, account: &Account) -> Result<RecordSource, Input
 }
 
 /// Name, first byte, type.
-type Field = (String, usize, Number);
+type Place = (String, usize, Number);
 
 /// The fields of a format, those inside others too.
 fn flatten(
@@ -192,7 +192,7 @@ fn flatten(
     formats: &BTreeMap<String, String>,
     depth: usize,
     account: &Account,
-) -> Result<Option<Vec<Field>>, Excess> {
+) -> Result<Option<Vec<Place>>, Excess> {
     let mut fields = Vec::new();
     let mut at = 0;
     let Some(format) = formats.get(format) else { return Ok(None) };

@@ -56,22 +56,15 @@ fn ratios(k: f64) -> (Vec<f64>, f64) {
     let mut simple = [[100.0 * r, 0.0], [0.0, 1e-4 + sigma * sigma]];
     let (f2, q2) = ([[1.0, dt], [0.0, 1.0]], [[n * n * dt, 0.0], [0.0, k * k * dt]]);
     // truth (angle, constant, drift) with the estimates of the simple one (angle, walk), which starts at zero
-    let mut joint = [[0.0; 5]; 5];
-    for i in 0..3 {
-        joint[i][i] = right[i][i];
-    }
-    let mut f5 = [[0.0; 5]; 5];
-    let mut q5 = [[0.0; 5]; 5];
-    for i in 0..3 {
-        for j in 0..3 {
-            (f5[i][j], q5[i][j]) = (f3[i][j], q3[i][j]);
-        }
-    }
-    for i in 0..2 {
-        for j in 0..2 {
-            f5[3 + i][3 + j] = f2[i][j];
-        }
-    }
+    let table =
+        |of: &dyn Fn(usize, usize) -> f64| -> Square<5> { std::array::from_fn(|i| std::array::from_fn(|j| of(i, j))) };
+    let mut joint = table(&|i, j| if i == j && i < 3 { right[i][i] } else { 0.0 });
+    let f5 = table(&|i, j| match (i < 3, j < 3) {
+        (true, true) => f3[i][j],
+        (false, false) => f2[i - 3][j - 3],
+        _ => 0.0,
+    });
+    let q5 = table(&|i, j| if i < 3 && j < 3 { q3[i][j] } else { 0.0 });
     let mut found = Vec::new();
     let mut nees = f64::NAN;
     for step in 0..60_000 {
@@ -83,18 +76,12 @@ fn ratios(k: f64) -> (Vec<f64>, f64) {
         }
         update(&mut right, r);
         let gain = update(&mut simple, r);
-        let mut a = [[0.0; 5]; 5];
-        let mut added = [[0.0; 5]; 5];
-        for (i, row) in a.iter_mut().enumerate() {
-            row[i] = 1.0;
-        }
-        for i in 0..2 {
-            a[3 + i][0] += gain[i];
-            a[3 + i][3] -= gain[i];
-            for j in 0..2 {
-                added[3 + i][3 + j] = gain[i] * gain[j] * r;
-            }
-        }
+        // the estimates take the gain times z less the estimated angle
+        let a = table(&|i, j| {
+            let seen = if i < 3 { 0.0 } else { gain[i - 3] * (f64::from(j == 0) - f64::from(j == 3)) };
+            f64::from(i == j) + seen
+        });
+        let added = table(&|i, j| if i < 3 || j < 3 { 0.0 } else { gain[i - 3] * gain[j - 3] * r });
         joint = moved(&a, &joint, &added);
         // drift less its estimate: constant + drift − walk
         let c = [0.0, 1.0, 1.0, 0.0, -1.0];

@@ -404,7 +404,10 @@ impl Log {
     fn usable(&self, axes: &[AxisRange], check: &LogCheck) -> Result<(), InputError> {
         for (axis, info) in axes.iter().zip(&self.choice.axes) {
             if axis.usable == 0 {
-                return self.fail(format!("column '{}' holds no number in {} rows", axis.name, check.samples));
+                let of_it = |found: &&Finding| found.kind == "overflow" && found.axis.as_ref() == Some(&axis.name);
+                let why = check.findings.iter().find(of_it).map(|found| format!(": {}", found.message));
+                let (name, rows) = (&axis.name, check.samples);
+                return self.fail(format!("column '{name}' holds no number in {rows} rows{}", why.unwrap_or_default()));
             }
             if axis.smallest == axis.largest {
                 let value = info.unit.from_si(axis.smallest);

@@ -48,7 +48,7 @@ pub enum TimeBase {
 /// One thing found, with how often and where it is first seen (sample index, 0-based; and seconds from the start).
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Finding {
-    /// Short code: "jitter", "gap", "repeated-stamp", "backward-stamp", "rate", "zero-row", "repeated-row", "nan", "stuck",
+    /// Short code: "jitter", "gap", "repeated-stamp", "backward-stamp", "rate", "zero-row", "repeated-row", "nan", "overflow", "stuck",
     /// "saturated", "quantised", "outlier", "motion", "calm", "temperature", "topic",
     /// "damaged".
     pub kind: String,

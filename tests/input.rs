@@ -20,6 +20,10 @@ mod messages;
 mod npy;
 #[path = "input/parquet.rs"]
 mod parquet;
+#[path = "input/plain.rs"]
+mod plain;
+#[path = "input/units.rs"]
+mod units;
 #[path = "input/vendors.rs"]
 mod vendors;
 

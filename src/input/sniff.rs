@@ -225,7 +225,8 @@ fn describe(
     let numeric = |text: &[u8]| -> Vec<bool> {
         fields(text, delimiter).take(columns).map(|f| !f.is_empty() && number(f, decimal_comma).is_some()).collect()
     };
-    let Some(start) = body.iter().position(|l| fits(l.text)) else {
+    let says_rate = |l: &Line| said_rate(&String::from_utf8_lossy(l.text)).is_some();
+    let Some(start) = body.iter().position(|l| fits(l.text) && !says_rate(l)) else {
         return Err("no rows of numbers found".into());
     };
     let table = &body[start..];

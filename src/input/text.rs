@@ -261,7 +261,8 @@ impl Table for TextTable {
                 let read = self.plain_rows(FIRST, rows);
                 let timed = self.form.slots.iter().any(|slot| matches!(slot, Slot::Time));
                 if !rows.lines.is_empty() && (self.form.origin.is_some() || !timed) {
-                    self.ahead = Some(Ahead::new(size));
+                    // parsed, checked and on their way, and a quarter for what else there is
+                    self.ahead = Some(Ahead::new(size, self.account.left() / 4));
                 }
                 read
             }

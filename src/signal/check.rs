@@ -48,7 +48,7 @@ pub enum TimeBase {
 /// One thing found, with how often and where it is first seen (sample index, 0-based; and seconds from the start).
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Finding {
-    /// Short code: "jitter", "gap", "repeated-stamp", "backward-stamp", "rate", "zero-row", "repeated-row", "nan", "overflow", "stuck",
+    /// Short code: "jitter", "time-unit", "gap", "repeated-stamp", "backward-stamp", "rate", "zero-row", "repeated-row", "nan", "overflow", "stuck",
     /// "saturated", "quantised", "outlier", "motion", "calm", "temperature", "topic",
     /// "damaged".
     pub kind: String,
@@ -426,7 +426,7 @@ fn time_notes(timing: &Timing, stamps: &Stamps, rate_hz: f64, rows: u64) -> Vec<
             short(rate_hz),
             short(span)
         );
-        notes.push(Note { kind: "rate", count: 1, first: None, message, serious: true });
+        notes.push(Note { kind: "time-unit", count: 1, first: None, message, serious: true });
     }
     notes
 }

@@ -257,15 +257,15 @@ fn files_made_on_purpose_take_no_more_than_others() {
             "elements.mat",
             mat(|out| {
                 let head = structure(b"s", 10_000, &[b'a'; 10_000]);
-                out.write_all(&[14, head.len() as u32 + 800_000_000].map(u32::to_le_bytes).concat()).unwrap();
+                out.write_all(&[14, head.len() as u32 + 160_000_000].map(u32::to_le_bytes).concat()).unwrap();
                 out.write_all(&head).unwrap();
                 let many = [14, 0].map(u32::to_le_bytes).concat().repeat(100_000);
-                (0..1000).for_each(|_| out.write_all(&many).unwrap());
+                (0..200).for_each(|_| out.write_all(&many).unwrap());
             }),
             WORK,
         ),
         ("shared.h5", shared_block(300), "a block at the address of another"),
-        ("long.h5", ladder(3, 1000, &"N".repeat(30_000)), "a name of 3000"),
+        ("long.h5", ladder(6, 8, &"N".repeat(1000)), "a name of 2003 bytes"),
         ("ladder.h5", ladder(16, 20, ""), ""),
         ("deep.h5", ladder(40, 1, "g"), "nested deeper than 32 levels"),
         ("deep.parquet", nested(20_000), "nested deeper than 32 levels"),

@@ -3,6 +3,7 @@
 
 use std::collections::VecDeque;
 use std::io::{BufRead, ErrorKind};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
@@ -57,6 +58,8 @@ impl Page {
 #[derive(Debug)]
 pub(super) struct Ahead {
     size: usize,
+    /// Bytes of rows that are enough for a time: short lines make many rows.
+    most: u64,
     parsed: VecDeque<Chunk>,
     spare: Vec<Chunk>,
     /// As many as there are threads: each stays in the cache of one.
@@ -74,9 +77,9 @@ struct Hands {
 }
 
 impl Ahead {
-    pub(super) fn new(size: usize) -> Self {
+    pub(super) fn new(size: usize, most: u64) -> Self {
         let (parsed, spare, pages) = (VecDeque::new(), Vec::new(), Vec::new());
-        Ahead { size, parsed, spare, pages, tail: Vec::new(), ended: false }
+        Ahead { size, most, parsed, spare, pages, tail: Vec::new(), ended: false }
     }
 
     /// There are parsed chunks.
@@ -89,10 +92,15 @@ impl Ahead {
         if self.parsed.is_empty() && !self.ended {
             let chunks = (EACH * rayon::current_num_threads()).clamp(EACH, MOST);
             let hands = Mutex::new(Hands { pages: std::mem::take(&mut self.pages), done: Vec::new() });
+            let (rows, most) = (AtomicU64::new(0), self.most);
+            let row = 8 * (2 + form.columns_of_values() as u64);
             let hands_now = || hands.lock().unwrap_or_else(PoisonError::into_inner);
             // who has the file reads a chunk, and parses it while others read and parse theirs
             let file = Mutex::new((&mut *self, reader, 0));
             (0..chunks).into_par_iter().with_max_len(1).for_each(|_| {
+                if rows.load(Ordering::Relaxed) * row > most {
+                    return;
+                }
                 let mut page = hands_now().pages.pop().unwrap_or_default();
                 let chunk = {
                     let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
@@ -104,6 +112,7 @@ impl Ahead {
                 };
                 let chunk = chunk.map(|mut chunk| {
                     page.parse(form, &mut chunk);
+                    rows.fetch_add(chunk.rows.lines.len() as u64, Ordering::Relaxed);
                     chunk
                 });
                 let mut hands = hands_now();

@@ -56,7 +56,7 @@ fn plainly(text: &[u8], form: &Form) -> Read {
 /// In chunks, by a reader that gives so many bytes at once.
 fn in_chunks(text: &[u8], form: &Form, size: usize, step: usize) -> Read {
     let mut reader = BufReader::new(Cursor::new(text.to_vec()));
-    let (mut ahead, mut read, mut before) = (Ahead::new(size), Read::default(), 0);
+    let (mut ahead, mut read, mut before) = (Ahead::new(size, u64::MAX), Read::default(), 0);
     read.add(&Rows { values: vec![Vec::new(); form.columns_of_values()], ..Rows::default() }, 0);
     while let Some(mut chunk) = ahead.next(&mut reader, step, form) {
         read.add(&chunk.rows, before);

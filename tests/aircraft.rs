@@ -1,5 +1,6 @@
 //! The airplane: its air, its motion, what it measures. Numbers named "the sheet's" come from a second implementation of the same equations.
 
+mod airplane;
 mod atmosphere;
 mod command;
 mod flights;

@@ -27,7 +27,7 @@ fn design(rate_hz: f64, aids: &str) -> AttitudeDesign {
     let params = Params::from_json(&GYRO.replace("285.7142857142857", &rate_hz.to_string()), "gyro.json").unwrap();
     let accelerometer = r#"{ "name": "z", "white": { "density": "0.0041 m/s^2/sqrt(Hz)" } }"#;
     let section = format!(r#"{{ "plant": "attitude", "accelerometer": {accelerometer}{aids} }}"#);
-    tune_attitude(&params, &Design::from_json(&section, "design").unwrap(), 1e4).unwrap().design
+    tune_attitude(&params, &Design::from_json(&section, "design", None).unwrap(), 1e4).unwrap().design
 }
 
 /// Degrees between two attitudes.

@@ -82,7 +82,7 @@ fn text(check: &AirplaneCheck) -> String {
         rows.push(("least power", format!("{} W at {:.1} m/s", digits(endurance.power), endurance.airspeed)));
     }
     let rows: Vec<Vec<String>> = rows.into_iter().map(|(name, value)| vec![name.into(), value]).collect();
-    out += &table(&["", ""], &rows).trim_start_matches('\n');
+    out += table(&["", ""], &rows).trim_start_matches('\n');
     for warning in &check.warnings {
         out += &format!("warning: {warning}\n");
     }

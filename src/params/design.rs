@@ -2,6 +2,7 @@
 //!
 //! It stands in params.json and, as it was used, in filter.json. Values keep their units; the matrices of a custom plant are SI.
 
+mod linear;
 mod written;
 
 use schemars::JsonSchema;
@@ -271,19 +272,21 @@ impl Design {
         }))
     }
 
-    /// Reads a file that holds nothing but the section.
-    pub fn from_json(text: &str, path: &str) -> Result<Design, ParamsError> {
+    /// Reads a file that holds nothing but the section, or a linear.json, of which `sensor` is the rate that the gyro measures (q, p or r).
+    pub fn from_json(text: &str, path: &str, sensor: Option<&str>) -> Result<Design, ParamsError> {
         let value = place::parse(text).map_err(|e| ParamsError::Syntax {
             path: path.into(),
             line: e.line,
             column: e.column,
             message: e.message,
         })?;
-        Design::from_place(&Place::root(&value)).map_err(|e| ParamsError::Invalid {
-            path: path.into(),
-            key: e.key,
-            message: e.message,
-        })
+        let root = Place::root(&value);
+        let design = match sensor {
+            _ if linear::is_linear(&value) => linear::linear(&root, sensor.unwrap_or("q")),
+            Some(sensor) => Err(root.error(format!("#{sensor} chooses a rate of a linear.json; this is a design"))),
+            None => Design::from_place(&root),
+        };
+        design.map_err(|e| ParamsError::Invalid { path: path.into(), key: e.key, message: e.message })
     }
 }
 

@@ -283,7 +283,8 @@ fn propulsion(place: &Place<'_>) -> Result<Propulsion, KeyError> {
     let (extra, table) = match kind.text()? {
         "thrust" => {
             let o = place.object(&["type", "greatest"])?;
-            return Ok(Propulsion::Thrust { greatest: positive(&o, "greatest", Dimension::FORCE)? });
+            let greatest = o.optional("greatest").map(|_| positive(&o, "greatest", Dimension::FORCE)).transpose()?;
+            return Ok(Propulsion::Thrust { greatest: greatest.unwrap_or(f64::INFINITY) });
         }
         "motor" => (vec!["torque"], false),
         "table" => (vec!["power", "advance_ratio"], true),

@@ -69,6 +69,9 @@ struct Measures {
     bank: [Option<f64>; 2],
 }
 
+/// Name, unit, value, level, note.
+type Judged = (&'static str, &'static str, Option<f64>, Option<u8>, Option<String>);
+
 /// n/α = −Zw V/g, 1/rad.
 pub fn load_per_angle(models: &LinearModels, speed: f64) -> f64 {
     -models.longitudinal.a[(1, 1)] * speed / GRAVITY
@@ -104,6 +107,7 @@ impl Measures {
         }
     }
 
+    /// Name, unit, value, level and why not, of every criterion.
     fn judged(&self, category: Category) -> Vec<Judged> {
         use Category::{A, B, C};
         let infinite = f64::INFINITY;

@@ -146,10 +146,11 @@ impl Airplane {
                 };
                 let h = step(unit);
                 let [d1, d2, d4] = [h, 0.5 * h, 0.25 * h].map(difference);
-                for i in 0..8 {
+                let limit: [f64; 8] = std::array::from_fn(|i| {
                     let (once, again) = ((4.0 * d2[i] - d1[i]) / 3.0, (4.0 * d4[i] - d2[i]) / 3.0);
-                    out[(i, j)] = (16.0 * again - once) / 15.0;
-                }
+                    (16.0 * again - once) / 15.0
+                });
+                out.column_mut(j).copy_from_slice(&limit);
             }
             out
         };

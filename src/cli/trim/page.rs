@@ -130,7 +130,7 @@ fn step(model: &LinearModel, input: usize, by: f64, label: &str) -> String {
     joined.view_mut((0, 0), (n, n)).copy_from(&model.a);
     joined.view_mut((0, n), (n, 1)).copy_from(&(model.b.column(input) * by));
     let forward = (joined * h).exp();
-    let mut x = DVector::zeros(n + 1);
+    let mut x = DVector::<f64>::zeros(n + 1);
     x[n] = 1.0;
     let mut curves: Vec<Curve> = model
         .states

@@ -63,9 +63,12 @@ impl PlantFlags {
         let plant = match self.plant.as_deref() {
             None => return Ok(documented),
             Some(name) if name == documented.plant.name() => return Ok(documented),
-            Some(path) if path.ends_with(".json") => {
-                let text = std::fs::read_to_string(path).with_context(|| format!("--plant {path}: cannot read"))?;
-                return Ok(Design::from_json(&text, path)?);
+            Some(path) if path.ends_with(".json") || path.contains(".json#") => {
+                let (path, sensor) = path
+                    .split_once(".json#")
+                    .map_or((path.to_string(), None), |(stem, sensor)| (format!("{stem}.json"), Some(sensor)));
+                let text = std::fs::read_to_string(&path).with_context(|| format!("--plant {path}: cannot read"))?;
+                return Ok(Design::from_json(&text, &path, sensor)?);
             }
             Some("static") => PlantEntry::Static,
             Some("angle") => PlantEntry::Angle { initial_std_dev: None },

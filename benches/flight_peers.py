@@ -170,8 +170,9 @@ def started(folder, step, start, controls, wind=(0, 0), flat=False, place=(0.0, 
         fdm[f"ic/{k}-rad_sec"] = start[k]
     for k, v in zip(("de", "da", "dr", "dt"), controls):
         fdm[f"ext/{k}"] = v
-    fdm["atmosphere/wind-north-fps"], fdm["atmosphere/wind-east-fps"] = wind[0] / FT, wind[1] / FT
     assert fdm.run_ic()
+    # run_ic sets the wind to that of its own conditions, which is none
+    fdm["atmosphere/wind-north-fps"], fdm["atmosphere/wind-east-fps"] = wind[0] / FT, wind[1] / FT
     return fdm
 
 

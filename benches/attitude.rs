@@ -30,7 +30,7 @@ fn attitude_model() -> AttitudeModel {
     let section = r#"{ "plant": "attitude", "accelerometer": { "name": "z", "white": { "density": "0.0041 m/s^2/sqrt(Hz)" } },
         "aids": [{ "name": "magnetometer", "std_dev": "3 deg", "gauss_markov": { "std_dev": "3 deg", "correlation_time": "1 s" } }] }"#;
     let params = Params::from_json(&gyro, "the bench").expect("sound parameters");
-    let design = Design::from_json(section, "the bench").expect("a sound design");
+    let design = Design::from_json(section, "the bench", None).expect("a sound design");
     tune_attitude(&params, &design, 1e4).expect("a sound model").design.model
 }
 

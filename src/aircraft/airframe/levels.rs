@@ -25,9 +25,6 @@ pub enum Category {
 
 pub const CATEGORIES: [Category; 3] = [Category::A, Category::B, Category::C];
 
-/// Name, unit, value, level and why not, of a criterion.
-type Judged = (&'static str, &'static str, Option<f64>, Option<u8>, Option<String>);
-
 impl Category {
     pub fn name(self) -> &'static str {
         match self {

@@ -88,7 +88,8 @@ fn a_line_fs_before_the_table_is_the_rate() {
     assert_eq!(log.sample_rate_hz, 100.0);
     assert!(check.findings.iter().any(|f| f.kind == "rate" && f.message == "100 Hz by 'Fs' of the file" && !f.serious));
     // other names must say hertz
-    assert!(refused(&format!("Sample rate,100\n\ngx_dps,gy_dps\n{rows}"), &[]).contains("no sample rate"));
+    let rows: String = (0..300).map(|i| format!("{},{},1\n", (i * 7919) % 131, i % 7)).collect();
+    assert!(refused(&format!("Sample rate,100\n\ngx_dps,gy_dps,n\n{rows}"), &[]).contains("no sample rate"));
 }
 
 /// Stamps in seconds whose header says milliseconds.

@@ -4,6 +4,7 @@
 //! Q = Σ (θ_l − θ̄)²/v_l, what is not by twice the fall of Σ ln L_l when one value has to do for all logs, the other parameters free in each: both are χ²_{k−1}
 //! where the k logs do not differ. Where they do, θ_l ~ N(μ, τ² + v_l): τ² is where Q(τ²) = Σ (θ_l − μ)²/(τ² + v_l) is its expectation k − 1, its 95 % limits where
 //! Q is at the quantiles of χ²_{k−1}, and μ has the interval of Student's t with k − 1 degrees of freedom. All of logarithms.
+//! Lines are not compared, nor is the shape of a filter.
 //! Sources: Cochran 1954 (Q); Paule & Mandel 1982 (τ²); Viechtbauer 2007 (limits of τ²); Hartung & Knapp 2001 (interval of μ); Wilks 1938.
 
 use rayon::prelude::*;
@@ -237,7 +238,9 @@ fn places(params: &mut AxisParams, fit: &Fit) -> Vec<Place> {
         };
         // the white noise that goes with a band limit is none that was fitted
         let floor = fit.form.pieces()[piece].kind() == Kind::White && fit.form.has(Kind::BandLimit);
-        let fitted = !matches!(role, Role::Shape) && !floor;
+        // a line of one start need not be in another, and has a maximum of its own at every frequency
+        let line = fit.form.pieces()[piece].kind() == Kind::Oscillation;
+        let fitted = role != Role::Shape && !floor && !line;
         let written = written.iter().position(same).filter(|_| fitted)?;
         Some(Place { index, written, coefficient: role == Role::Coefficient })
     };

@@ -173,11 +173,14 @@ fn the_command() {
         end(0),
         end(1)
     );
-    assert!(exported.contains(&line) && exported.contains("# inflation: none beyond that\n"), "{exported}");
+    assert!(
+        exported.contains(&line) && exported.contains("inflation: none beyond the measured one below"),
+        "{exported}"
+    );
     assert!(exported.contains("# drift as identified at rest"), "{exported}");
     let both = bench.ok("export inflated.json --to kalibr --inflate 2");
-    assert!(both.contains(&line) && both.contains("are 2.000 times those above"), "{both}");
-    assert!(bench.ok(&format!("export {params} --to kalibr")).contains("# inflation: none\n"));
+    assert!(both.contains(&line) && both.contains("are 2.000 times those below"), "{both}");
+    assert!(bench.ok(&format!("export {params} --to kalibr")).contains("inflation: none;"));
     bench.ok("inflate inflated.json flight.npy -o again.json");
     let again: serde_json::Value = serde_json::from_str(&bench.read("again.json")).unwrap();
     let twice = &again["source"]["inflation"][0];

@@ -141,7 +141,7 @@ fn a_correlation_time_without_an_upper_limit_goes_through() {
     bench.ok("tune params.json -o filter.json");
     let exported = bench.ok("export params.json --to gnss-ins-sim");
     // N has an interval, K has none
-    let densities = exported.lines().find(|line| line.contains("K = ")).unwrap();
+    let densities = exported.lines().find(|line| line.contains(": N = ")).unwrap();
     assert!(densities.matches('[').count() == 1 && !densities.contains("inf]"), "{exported}");
     bench.file("claims.json", PARAMS_OF_A_CLAIM);
     let out = bench.run("compare claims.json log.csv --rate 1 --parameters");

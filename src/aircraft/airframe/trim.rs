@@ -235,6 +235,17 @@ impl Airplane {
                 ));
             }
         }
+        // beyond the stall the other controls say nothing: lift is what is missing
+        if let Some(stall) = self.aerodynamics.stall.filter(|stall| trim.alpha >= stall.angle) {
+            return Err(TrimError::new(
+                "lift",
+                format!(
+                    "no lift: steady flight at {speed} m/s needs an angle of attack of {:.1} deg, the stall is at {:.1} deg",
+                    trim.alpha.to_degrees(),
+                    stall.angle.to_degrees()
+                ),
+            ));
+        }
         let most = self.propulsion.greatest();
         let solved = residual < 1e-6;
         if c.throttle > most || (!solved && c.throttle > 0.9 * most) {
@@ -254,16 +265,6 @@ impl Airplane {
                 "brake",
                 format!(
                     "no brake: steady flight at {speed} m/s needs a throttle below zero; descend less or fly slower"
-                ),
-            ));
-        }
-        if let Some(stall) = self.aerodynamics.stall.filter(|stall| trim.alpha >= stall.angle) {
-            return Err(TrimError::new(
-                "lift",
-                format!(
-                    "no lift: steady flight at {speed} m/s needs an angle of attack of {:.1} deg, the stall is at {:.1} deg",
-                    trim.alpha.to_degrees(),
-                    stall.angle.to_degrees()
                 ),
             ));
         }

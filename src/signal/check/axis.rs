@@ -11,7 +11,7 @@
 //!   step is at least 1 % of the noise.
 //! - *Motion*: standard deviation in windows (64 samples or more), as the mean distance from the mean tells it, over 3 times its median and over what
 //!   correlated noise, whose windows differ as much as their calmer half says, reaches in one of 10⁶ logs; or the means of the windows
-//!   spread (5 % to 95 %) over more than 3 deg/s or 0.5 m/s², and more than the samples inside one do; or a mean rate above 25 deg/s.
+//!   spread (5 % to 95 %) over more than 3 deg/s or 0.5 m/s²; or a mean rate above 25 deg/s.
 
 use std::collections::BTreeMap;
 
@@ -31,8 +31,6 @@ const SHORTEST_WINDOW: usize = 50;
 const OUTLIER: f64 = 8.0;
 /// A window that moves scatters so many times as much as usual.
 const LOUDER: f64 = 3.0;
-/// Distance of the 5 % and the 95 % of normal values, in standard deviations: noise whose means differ less than its samples do is no motion, however loud.
-const NORMAL_SPREAD: f64 = 3.29;
 /// Degrees of freedom from which chance never makes it so.
 const MANY: f64 = 25.0;
 
@@ -481,7 +479,7 @@ impl AxisCheck {
                 show(usual.sqrt())
             );
             out.push(finding(moving.len() as u64 * self.rest.size, Some(*first), what));
-        } else if spread * to_rate > most_spread && spread > NORMAL_SPREAD * usual.sqrt() {
+        } else if spread * to_rate > most_spread {
             let what = format!("the means over {} s spread over {}", short(seconds), show(spread));
             out.push(finding(self.usable, None, what));
         } else if mean.abs() * to_rate > most_mean {

@@ -40,8 +40,11 @@ fn near(found: &[f64], expected: &[f64], tolerance: f64) {
     }
 }
 
+/// A request, and what the trim must be.
+type Steady = ([f64; 3], [f64; 7], [f64; 4], [f64; 8]);
+
 #[rustfmt::skip]
-const TRIMS: [([f64; 3], [f64; 7], [f64; 4], [f64; 8]); 4] = [
+const TRIMS: [Steady; 4] = [
     // airspeed, climb, turn rate; alpha phi theta elevator aileron rudder throttle; thrust torque rate current; u w p q r F/m
     ([25.0, 0.0, 0.0], [0.053873983, -0.000530560, 0.053873975, -0.135469407, 0.006129659, -0.000977192, 0.777789841],
      [10.352416, 0.627798, 517.33881, 11.03272], [24.963728699, 1.346198144, 0.0, 0.0, 0.0, 0.528067687, 0.005195466, -9.792420628]),

@@ -84,6 +84,9 @@ impl TrimError {
 
 type Unknowns = SVector<f64, 8>;
 
+/// What remains, m/s² or rad/s², where the controls are those of the flight asked for, to as many digits as a message shows.
+const SOLVED: f64 = 1e-6;
+
 impl Airplane {
     /// Errors: outside the standard atmosphere, or lift, elevator, thrust or another control does not suffice.
     pub fn trim(&self, request: &TrimRequest) -> Result<Trim, TrimError> {
@@ -107,25 +110,28 @@ impl Airplane {
         let pressure = 0.5 * air.density * speed * speed * self.size.area;
         let needed = self.mass * g * request.climb.cos() / (pressure * bank.cos());
         let lift = &self.aerodynamics.lift;
+        // the wing alone does not carry the airplane: said where thrust cannot make up for it, or no steady flight is found
+        let mut too_slow = None;
         if let Some(stall) = self.aerodynamics.stall {
             let most = (0..200)
                 .map(|i| self.aerodynamics.lift_and_drag(&self.size, stall.angle * f64::from(i) / 150.0, 0.0, 0.0).0)
                 .fold(0.0, f64::max);
             // a wing near its stall is helped by the part of the thrust that points up
             let thrust = self.propulsion.running(self.propulsion.greatest(), speed, air.density).thrust;
+            let turn = match bank {
+                0.0 => String::new(),
+                bank => format!(" in a turn of {:.1} deg bank", bank.to_degrees()),
+            };
+            let error = TrimError::new(
+                "lift",
+                format!(
+                    "no lift: {speed} m/s{turn} needs a lift coefficient of {needed:.2}, the wing stalls at {most:.2}; fly faster or turn less"
+                ),
+            );
             if needed > most + (thrust * (stall.angle + request.climb).sin() / pressure).max(0.0) {
-                return Err(TrimError::new(
-                    "lift",
-                    format!(
-                        "no lift: {speed} m/s{} needs a lift coefficient of {needed:.2}, the wing stalls at {most:.2}; fly faster or turn less",
-                        if bank == 0.0 {
-                            String::new()
-                        } else {
-                            format!(" in a turn of {:.1} deg bank", bank.to_degrees())
-                        }
-                    ),
-                ));
+                return Err(error);
             }
+            too_slow = (needed > most).then_some(error);
         }
         let alpha = (needed - lift.zero) / lift.alpha;
         let throttle = 0.5 * self.propulsion.greatest().min(2.0 * self.mass * g);
@@ -161,7 +167,10 @@ impl Airplane {
             }
             (x, r) = (next, after);
         }
-        self.judge(&x, r.amax(), request, air.density)
+        match too_slow {
+            Some(error) if r.amax() >= SOLVED => Err(error),
+            _ => self.judge(&x, r.amax(), request, air.density),
+        }
     }
 
     /// u̇ v̇ ẇ ṗ q̇ ṙ, climb and the sideways condition at a set of unknowns.
@@ -223,7 +232,7 @@ impl Airplane {
             .map(|(n, c, i)| (n, c, self.actuators[i]))
         {
             let Some([least, greatest]) = actuator.map(|a| a.travel) else { continue };
-            if residual < 1e-6 && !(least..=greatest).contains(&at) {
+            if residual < SOLVED && !(least..=greatest).contains(&at) {
                 return Err(TrimError::new(
                     name,
                     format!(
@@ -247,7 +256,7 @@ impl Airplane {
             ));
         }
         let most = self.propulsion.greatest();
-        let solved = residual < 1e-6;
+        let solved = residual < SOLVED;
         if c.throttle > most || (!solved && c.throttle > 0.9 * most) {
             return Err(TrimError::new(
                 "thrust",
@@ -260,7 +269,7 @@ impl Airplane {
                 ),
             ));
         }
-        if c.throttle < 0.0 {
+        if solved && c.throttle < 0.0 {
             return Err(TrimError::new(
                 "brake",
                 format!(

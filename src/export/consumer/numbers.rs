@@ -255,7 +255,7 @@ impl Numbers {
     /// The one Gauss-Markov process of a consumer that has one, beside a walk if `walks`; `None` when nothing is left for it.
     ///
     /// One process is taken as it is. Of several, of flicker, and of a walk where the consumer has none, it is the process whose Allan deviation,
-    /// with the white noise, is nearest the sensor's: the largest ratio (second result) is least over averaging times from a step to [`SLOWEST`].
+    /// with the white noise, is nearest the sensor's: the largest ratio (second result) is least over averaging times from a step to `SLOWEST`.
     pub fn single_process(&self, walks: bool) -> Option<(GaussMarkov, f64)> {
         let mut drift = self.drift.clone();
         drift.retain(|term| !(walks && matches!(term, Term::RateRandomWalk { .. })));

@@ -91,7 +91,9 @@ fn likelihood_study_of_lines() {
 #[test]
 fn intervals_of_lines_hold_the_truth() {
     for (name, [inside, outside]) in NAMES.iter().zip(counts(16, &parse_model("white+osc+gm").unwrap())) {
-        assert!(inside >= 5 && outside < 6, "{name}: {inside} in, {outside} out");
+        // drift is told in fewer of these logs than a line is
+        let least = if name.starts_with("Gauss-Markov") { 5 } else { 8 };
+        assert!(inside >= least && outside < 6, "{name}: {inside} in, {outside} out");
     }
 }
 

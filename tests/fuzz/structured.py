@@ -7,13 +7,17 @@ A finding is an exit status that is not 0 or 2, or more than 5 s of processor ti
 that are kept (16 bytes a row, since a column grows by doubling): who wants more is ended by the system. The file of a finding stays in FOLDER, under its seed. Samples are
 intact files, which are cut, repeated and changed. Needs nothing but Python's own library; exits with 1 if there are findings.
 """
-import argparse, bz2, gzip, json, os, random, resource, signal, struct, subprocess, sys, tempfile, time, zlib
+import argparse, bz2, gzip, json, os, random, resource, shutil, signal, struct, subprocess, sys, tempfile, time, zlib
 
 R = random.Random()
+CALM = 0  # how often a number is one that makes sense, so that readers also come far
+
 
 
 def odd(most=2**32 - 1):
     """A number that somebody forgot to look at."""
+    if R.random() < CALM:
+        return R.randrange(1, 40) & most
     n = R.choice([0, 1, 2, 3, 7, 8, 100, 255, 256, 4096, 65535, 65536, 1 << 20, (1 << 24) + 1, (1 << 31) - 1, 1 << 31, 2**32 - 1,
                   1 << 40, (1 << 63) - 1, 1 << 63, 2**64 - 1, R.randrange(1000), R.getrandbits(32)])
     return n & most
@@ -207,8 +211,10 @@ def parquet():
     schema = [node(b'root', children=1 if deep else len(columns))]
     schema += [node(name(3000), children=1 if i + 1 < deep else len(columns)) for i in range(deep)]
     schema += [node(*column) for column in columns]
-    body, chunks = b'PAR1', []
+    body, chunks = bytearray(b'PAR1'), []
     for text, kind in columns[:3] + columns[:1] * max(0, len(columns) - 3):
+        if len(body) > 16 << 20:
+            break
         start, codec = len(body), R.choice([0, 0, 2, 2, 1, 5, 6, 7])
         dictionary = R.random() < .4
         pages = []
@@ -230,7 +236,7 @@ def parquet():
     groups = [group] * (R.choice([1, 1, 2, min(count(4), 2000)]) if len(chunks) < 50 else 1)
     total = R.choice([rows * len(groups), odd(2**62)])
     foot = thrift([(1, 5, 1), (2, 9, (12, schema)), (3, 6, total), (4, 9, (12, groups))])
-    return body + foot + struct.pack('<I', len(foot)) + b'PAR1'
+    return bytes(body) + foot + struct.pack('<I', len(foot)) + b'PAR1'
 
 
 def zstd(n):
@@ -249,7 +255,8 @@ def imu():
 def packed(kind, data):
     n = R.choice([len(data), len(data), odd(2**33), 1 << 22])
     if kind == b'bz2':
-        return bz2.compress(data), n
+        data = data[:1 << 20]  # more takes Python a minute
+        return bz2.compress(data), len(data) if R.random() < .7 else n
     if kind == b'zstd':
         size = R.choice([1 << 16, 1 << 22, 1 << 26, 1 << 31])
         return zstd(size), R.choice([size, n])
@@ -338,8 +345,10 @@ def db3():
 def text():
     cell = lambda: R.choice([b'1', b'0.5', b'', b'nan', b'x', b'1e308', b'"a', b'-7', b'\x1b[31m', b'1/131'])
     separator = R.choice([b',', b';', b'\t', b' '])
-    line = separator.join(cell() for _ in range(min(count(), 100000))) + b'\n'
-    head = separator.join(name(100000) for _ in range(R.randrange(1, 6))) + b'\n'
+    columns = min(count(), 100000)
+    calm = R.random() < .5
+    line = separator.join(b'0.5' if calm else cell() for _ in range(columns)) + b'\n'
+    head = separator.join(name(100000) for _ in range(columns if calm else R.randrange(1, 6))) + b'\n'
     data = R.choice([b'', head, b'Fs,100\n', b'# ' + head]) + line * min(count(6), max(1, 20000000 // len(line)))
     return gzip.compress(data * R.choice([1, 1, 10]), R.choice([1, 9])) if R.random() < .4 else data
 
@@ -371,13 +380,13 @@ def damaged(data):
     return bytes(data[:64 << 20])
 
 
-def run(exe, path, out, data):
+def run(exe, path, out, data, command=('info', '--json')):
     """Status and seconds with so many bytes of data for the process (what it has from the system, without its code)."""
     def limits():
         resource.setrlimit(resource.RLIMIT_CPU, (20, 20))
         resource.setrlimit(resource.RLIMIT_DATA, (data, data))
     with open(out, 'wb') as stdout, open(out + '.err', 'wb') as stderr:
-        child = subprocess.Popen([exe, 'info', '--json', path], stdout=stdout, stderr=stderr, preexec_fn=limits, env=dict(os.environ, RAYON_NUM_THREADS='2', MALLOC_ARENA_MAX='2'))
+        child = subprocess.Popen([exe, *command, path], stdout=stdout, stderr=stderr, preexec_fn=limits, env=dict(os.environ, RAYON_NUM_THREADS='2', MALLOC_ARENA_MAX='2'))
         _, status, usage = os.wait4(child.pid, 0)
         child.returncode = os.waitstatus_to_exitcode(status)
     return child.returncode, usage.ru_utime + usage.ru_stime
@@ -386,6 +395,28 @@ def run(exe, path, out, data):
 def rows(out):
     with open(out, errors='replace') as found:
         return max((topic['rows'] or 0 for topic in json.load(found)['topics']), default=0)
+
+
+def one(seed, formats, samples):
+    """The file of a seed, and what it is."""
+    global CALM
+    R.seed(seed)
+    CALM = R.choice([0, .9, .99])
+    if samples and R.random() < .3:
+        return 'sample', damaged(R.choice(samples))
+    make = R.choice(formats)
+    data = make()
+    return make.__name__, damaged(data) if R.random() < .2 else data
+
+
+def judged(exe, path, out, size):
+    """Exit status, seconds and what was said of a file, within what such a file may take."""
+    allowed = 4 * size + (16 << 20)
+    status, seconds = run(exe, path, out, allowed)
+    if status not in (0, 2) and run(exe, path, out, 8 << 30)[0] == 0:
+        # the numbers that are kept come on top
+        status, seconds = run(exe, path, out, allowed + 16 * min(rows(out), 1 << 28))
+    return status, seconds, open(out + '.err', errors='replace').read()
 
 
 def main():
@@ -397,39 +428,36 @@ def main():
     parser.add_argument('--keep', default='.')
     parser.add_argument('--only', default='')
     args = parser.parse_args()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    signal.signal(signal.SIGTERM, lambda *_: signal.raise_signal(signal.SIGINT))
     formats = [f for f in FORMATS if not args.only or f.__name__ in args.only.split(',')]
     samples = [open(path, 'rb').read() for path in args.samples if os.path.getsize(path) < 4 << 20]
     os.makedirs(args.keep, exist_ok=True)
     folder = tempfile.mkdtemp(dir='/dev/shm' if os.path.isdir('/dev/shm') else None)
     path, out = os.path.join(folder, 'file'), os.path.join(folder, 'out')
     began, seed, findings, read, worst = time.time(), args.seed, 0, 0, {}
-    while time.time() - began < args.seconds:
-        R.seed(seed)
-        if samples and R.random() < .3:
-            kind, data = 'sample', damaged(R.choice(samples))
-        else:
-            make = R.choice(formats)
-            kind, data = make.__name__, make()
-            data = damaged(data) if R.random() < .2 else data
-        open(path, 'wb').write(data)
-        allowed = 4 * len(data) + (16 << 20)
-        status, seconds = run(args.exe, path, out, allowed)
-        if status not in (0, 2) and run(args.exe, path, out, 8 << 30)[0] == 0:
-            # the numbers that are kept come on top
-            status, seconds = run(args.exe, path, out, allowed + 16 * min(rows(out), 1 << 28))
-        read += status == 0
-        said = open(out + '.err', errors='replace').read()
-        why = [f'exit {status}'] * (status not in (0, 2)) + [f'{seconds:.1f} s'] * (seconds > 5)
-        why += ['more than a line'] * (status == 2 and said.count('\n') != 1)
-        top = worst.setdefault(kind, [0, 0])
-        worst[kind] = [top[0] + 1, max(top[1], seconds)]
-        if why:
-            findings += 1
-            kept = os.path.join(args.keep, f'{kind}-{seed}')
-            open(kept, 'wb').write(data)
-            print(f'{kept}: {len(data)} bytes: {", ".join(why)}: {said[:200]!r}', flush=True)
-        seed += 1
+    try:
+        while time.time() - began < args.seconds:
+            kind, data = one(seed, formats, samples)
+            open(path, 'wb').write(data)
+            status, seconds, said = judged(args.exe, path, out, len(data))
+            read += status == 0
+            why = [f'exit {status}'] * (status not in (0, 2)) + [f'{seconds:.1f} s'] * (seconds > 5)
+            why += ['more than a line'] * (status == 2 and said.count('\n') != 1)
+            if status == 0 and len(data) < 1 << 20:
+                # the values themselves are read here; the work on them has limits of its own
+                status, _ = run(args.exe, path, out, 4 << 30, ('allan', '--rate', '100', '--json'))
+                why += [f'allan: exit {status}'] * (status not in (0, 1, 2))
+            top = worst.setdefault(kind, [0, 0])
+            worst[kind] = [top[0] + 1, max(top[1], seconds)]
+            if why:
+                findings += 1
+                kept = os.path.join(args.keep, f'{kind}-{seed}')
+                open(kept, 'wb').write(data)
+                print(f'{kept}: {len(data)} bytes: {", ".join(why)}: {said[:200]!r}', flush=True)
+            seed += 1
+    except KeyboardInterrupt:
+        pass
+    shutil.rmtree(folder)
     print(f'{seed - args.seed} files from seed {args.seed}, {read} of them read, in {time.time() - began:.0f} s: {findings} findings')
     for kind, (files, seconds) in sorted(worst.items()):
         print(f'{kind:10} {files:7} files, at most {seconds:.2f} s')

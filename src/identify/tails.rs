@@ -27,8 +27,9 @@ use crate::units::digits;
 
 /// Samples that are whitened at once, about: drift that is slower is taken off with their mean.
 pub(super) const SEGMENT: usize = 1 << 14;
-/// Segments that tell the kurtosis, at most, evenly spread: of a million samples it is known to half a percent.
-pub(super) const MOST_SEGMENTS: usize = 64;
+/// Segments that tell the kurtosis, at most, evenly spread: a quarter of a million samples know it to 0.01 (√(24/n)),
+/// which is a quarter of a percent of an interval.
+pub(super) const MOST_SEGMENTS: usize = 16;
 /// Lengths of blocks, the longest as long as filters of sensors remember.
 const BLOCKS: [usize; 3] = [1, 8, 64];
 /// Fewest blocks whose variance says something.

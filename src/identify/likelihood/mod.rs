@@ -290,10 +290,12 @@ fn fits(data: &Ordinates, choice: &ModelChoice) -> Vec<(Fit, Vec<Precision>)> {
         }
         ModelChoice::Terms { kinds, average, order } => {
             let forms = forms(kinds, *average, *order);
-            let fits = forms.par_iter().filter_map(|form| growth::fit(data, form));
-            let mut fits: Vec<(Fit, Vec<Precision>)> = fits.map(known).collect();
-            fits.sort_by(|a, b| score(&a.0, data).total_cmp(&score(&b.0, data)));
-            fits
+            let mut fits: Vec<Fit> = forms.par_iter().filter_map(|form| growth::fit(data, form)).collect();
+            let by_score = |a: &Fit, b: &Fit| score(a, data).total_cmp(&score(b, data));
+            fits.sort_by(by_score);
+            fits.iter_mut().take(LOOKED_AT).for_each(|fit| *fit = growth::replaced(data, fit.clone()));
+            fits.sort_by(by_score);
+            fits.into_par_iter().map(known).collect()
         }
     }
 }

@@ -1,6 +1,6 @@
 //! `kfdesign tune`.
 
-mod attitude;
+pub(super) mod attitude;
 mod compare;
 mod insight;
 mod logs;
@@ -13,6 +13,7 @@ mod truth;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::json;
 
@@ -27,6 +28,7 @@ use super::{Status, VerdictFlags};
 use crate::cli::checked;
 use crate::consistency::Verdict;
 use crate::export::atomic;
+use crate::filter::FilterDesign;
 use crate::montecarlo::{Outcome, Plan, verify};
 use crate::params::{Params, PlantEntry};
 use crate::replay::ReplayResult;
@@ -83,9 +85,13 @@ pub struct Args {
     reading: LogFlags,
 }
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Printed<'a> {
+/// What `tune --json` prints.
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Printed<'a> {
+    /// "kfdesign-tune/1".
+    format: &'static str,
+    /// As written with `-o`.
+    #[schemars(with = "FilterDesign")]
     filter: serde_json::Value,
     reports: &'a [AxisReport],
     verification: &'a Outcome,
@@ -159,6 +165,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if args.json {
         let filter = serde_json::from_str(&tuned.design.to_json())?;
         print_json(&Printed {
+            format: "kfdesign-tune/1",
             filter,
             reports: &tuned.reports,
             verification: &verification,

@@ -1,9 +1,10 @@
 //! The filter.json document: what a design holds, how it is written, its schema. `reading` reads and checks it.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use nalgebra::DMatrix;
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -251,6 +252,15 @@ fn rows_of(a: &DMatrix<f64>) -> Matrix {
 
 fn named(named: &Named) -> NamedDocument {
     NamedDocument { name: named.name.clone(), unit: named.unit.clone() }
+}
+
+impl JsonSchema for FilterDesign {
+    fn schema_name() -> Cow<'static, str> {
+        "FilterDesign".into()
+    }
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        FilterDocument::json_schema(generator)
+    }
 }
 
 impl From<&FilterDesign> for FilterDocument {

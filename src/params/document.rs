@@ -283,6 +283,15 @@ impl JsonSchema for AxisParams {
     }
 }
 
+impl JsonSchema for Params {
+    fn schema_name() -> Cow<'static, str> {
+        ParamsDocument::schema_name()
+    }
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        ParamsDocument::json_schema(generator)
+    }
+}
+
 impl Serialize for Params {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let hertz = in_unit(self.sample_rate_hz, "Hz").ok_or_else(|| serde::ser::Error::custom("Hz is a unit"))?;

@@ -14,6 +14,7 @@ use super::course::{AxisCourse, Channel};
 use crate::consistency::normalized::two_sided_p;
 use crate::numerics::distribution::{chi_square_sf, kolmogorov_sf, normal_quantile, normal_sf};
 use crate::numerics::linalg::symmetric_eigenvalues;
+use crate::numerics::optimize::bracketed_root;
 use crate::numerics::quadratic_form::QuadraticForm;
 
 /// Of so many judged components all are looked at together.
@@ -327,19 +328,13 @@ impl LeastLaw {
 
     /// t with P(p_min ≤ t) = `p`.
     pub fn quantile(&self, p: f64) -> f64 {
-        let (mut low, mut high) = (0.0, 1.0);
-        for _ in 0..200 {
-            let middle = 0.5 * (low + high);
-            if self.cdf(middle) < p {
-                low = middle
-            } else {
-                high = middle
-            }
-            if high - low <= 1e-14 * high {
-                break;
-            }
+        if p <= self.share || self.drawn.is_empty() {
+            return (self.tail * (p / self.share).powf(1.0 / self.power)).min(1.0);
         }
-        high
+        let place = p * self.drawn.len() as f64 - 0.5;
+        let (low, last) = (place as usize, self.drawn.len() - 1);
+        let (low, high, part) = (self.drawn[low.min(last)], self.drawn[(low + 1).min(last)], place.fract());
+        low + part * (high - low)
     }
 }
 
@@ -395,12 +390,7 @@ pub struct Gate {
 impl Gate {
     pub(super) fn new(axes: Vec<AxisGate>, alpha: f64) -> Gate {
         let mut gate = Gate { axes, alpha, critical: 0.0 };
-        let (mut low, mut high) = (0.0, 1.0);
-        for _ in 0..200 {
-            let middle = 0.5 * (low + high);
-            if gate.family(middle) < alpha { low = middle } else { high = middle }
-        }
-        gate.critical = low;
+        gate.critical = bracketed_root(|p| gate.family(p) - alpha, 0.0, 1.0, 0.0).unwrap_or(0.0);
         gate
     }
 

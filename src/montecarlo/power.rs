@@ -19,6 +19,7 @@ use super::gate::{AxisGate, Gate, Kind, Raw};
 use crate::filter::mismatch::{Expectation, ExpectedError, expect};
 use crate::model::LinearModel;
 use crate::numerics::distribution::{chi_square_cdf, chi_square_quantile, chi_square_sf, normal_quantile, normal_sf};
+use crate::numerics::optimize::bisect;
 
 /// Probability with which a mistuning counts as seen.
 pub const WISHED: f64 = 0.9;
@@ -268,15 +269,8 @@ impl<'a> Instrument<'a> {
             (low, high) = (high, (4.0 * high).min(limit));
             seen = power(high)?;
         }
-        while high - low > ACCURACY * high {
-            let middle = 0.5 * (low + high);
-            let at = power(middle)?;
-            if at.probability < WISHED {
-                low = middle;
-            } else {
-                (high, seen) = (middle, at);
-            }
-        }
+        let close = |low: f64, high: f64| (high - low > ACCURACY * high).then_some(0.5 * (low + high));
+        let (high, seen) = narrowed((low, high), seen, close, power)?;
         Some(Sighting { size: size(high), test: test_name(self.axis, seen.kind), confirmed: None })
     }
 }
@@ -451,14 +445,27 @@ fn least(first: u64, last: u64, power: impl Fn(u64) -> Option<Power>) -> Option<
         (low, high) = (high, (2 * high).min(last));
         seen = power(high)?;
     }
-    while high - low > 1 + high / 100 {
-        let middle = low + (high - low) / 2;
-        let at = power(middle)?;
-        if at.probability < WISHED {
-            low = middle;
-        } else {
-            (high, seen) = (middle, at);
-        }
-    }
+    let close = |low: u64, high: u64| (high - low > 1 + high / 100).then_some(low + (high - low) / 2);
+    let (high, seen) = narrowed((low, high), seen, close, power)?;
     Some((high, seen.kind))
+}
+
+/// The least place at which the power is as wished, between one where it is not and one where it is `seen`, and the
+/// power there.
+fn narrowed<T: Copy>(
+    (low, high): (T, T),
+    mut seen: Power,
+    between: impl Fn(T, T) -> Option<T>,
+    power: impl Fn(T) -> Option<Power>,
+) -> Option<(T, Power)> {
+    let past = |middle| {
+        let at = power(middle).ok_or(())?;
+        let enough = at.probability >= WISHED;
+        if enough {
+            seen = at;
+        }
+        Ok::<_, ()>(enough)
+    };
+    let (_, high) = bisect(low, high, between, past).ok()?;
+    Some((high, seen))
 }

@@ -10,7 +10,8 @@ use std::fmt;
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
-use super::course::{AxisCourse, Channel};
+use super::course::AxisCourse;
+use super::sums::Channel;
 use crate::consistency::normalized::two_sided_p;
 use crate::numerics::distribution::{chi_square_sf, kolmogorov_sf, normal_quantile, normal_sf};
 use crate::numerics::linalg::symmetric_eigenvalues;
@@ -115,7 +116,7 @@ pub struct Raw<'a> {
 
 impl<'a> Raw<'a> {
     pub fn new(axis: &'a AxisCourse, runs: u64) -> Raw<'a> {
-        Raw { axis, runs, over_time: axis.nees_over_time() }
+        Raw { axis, runs, over_time: nees_over_time(axis) }
     }
 
     /// Independent NEES values that the average over the evenly spread epochs of one run is worth: E² r / Σ_jk |ρ_jk|².
@@ -208,7 +209,11 @@ pub fn periodogram_distance(ordinates: &[f64]) -> (f64, usize) {
 
 /// Law of the NEES summed over the evenly spread epochs of a run of a true filter: its weights are the eigenvalues of the correlation
 /// matrix of the whitened errors of all these epochs, blocks ρ_jk = E(u_j u_kᵀ).
-pub(super) fn nees_over_time(axis: &AxisCourse) -> QuadraticForm {
+pub(super) fn nees_over_time(axis: &AxisCourse) -> &QuadraticForm {
+    axis.over_time.get_or_init(|| law_over_time(axis))
+}
+
+fn law_over_time(axis: &AxisCourse) -> QuadraticForm {
     let size = axis.judge.size();
     // evenly spread epochs follow those of the start
     let first = axis.epochs.iter().position(|epoch| epoch.regular).unwrap_or(axis.epochs.len());

@@ -3,9 +3,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::FAST;
 use super::ordinates::Ordinates;
-use super::whittle::{self, Fit};
+use super::whittle::{self, FAST, Fit};
 use crate::noise::{Kind, Term};
 use crate::numerics::distribution::NORMAL_95;
 use crate::numerics::optimize::covariance;

@@ -9,7 +9,6 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::super::shape::Role;
-use super::FAST;
 use super::form::{Form, Piece};
 use super::ordinates::Ordinates;
 use crate::noise::{Kind, Term};
@@ -19,6 +18,8 @@ use crate::numerics::optimize::{Look, Optimum, Problem, minimize};
 const SHORTEST: f64 = 0.3;
 /// That of a drift; what is shorter is wideband noise: white, and averaged by the sensor.
 const SHORTEST_DRIFT: f64 = 2.0;
+/// A Gauss-Markov process that forgets within so many samples is a matter of the sensor's bandwidth, not drift.
+pub(super) const FAST: f64 = 10.0;
 /// Beside a band limit a drift that forgets sooner is part of the filter; a line may be as wide as what is no drift elsewhere, [`FAST`]: what is not allowed to be one wide line
 /// becomes several, each as wide as it may be. That a filter's own resonance is no line is a matter of cost.
 pub(super) const WIDE_LINE: f64 = 30.0;

@@ -9,6 +9,7 @@ pub(super) mod plant_flags;
 mod sight;
 mod text;
 mod truth;
+mod view;
 
 use std::path::{Path, PathBuf};
 
@@ -20,6 +21,7 @@ use serde_json::json;
 use self::logs::Reading;
 use self::objective::{ObjectiveArg, ObjectiveFlags};
 use self::plant_flags::PlantFlags;
+use self::view::View;
 use super::files::{self, Kind};
 use super::flags::whole;
 use super::log_flags::LogFlags;
@@ -146,7 +148,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if let (Some(output), true) = (&args.output, verified) {
         atomic::write(output, tuned.design.to_json().as_bytes())?;
     }
-    let view = text::View {
+    let view = View {
         name: &name,
         params: &params,
         tuned: &tuned,

@@ -5,6 +5,8 @@
 
 use std::f64::consts::TAU;
 
+use crate::numerics::optimize::bracketed_root;
+
 /// A coefficient over the advance ratio J.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Curve {
@@ -83,16 +85,13 @@ impl Motor {
             density * n * n * d.powi(5) * self.torque.at(j)
                 - k * ((volts - k * rate) / resistance - self.no_load_current)
         };
-        let (mut low, mut high) = (0.0, (volts / k).max(0.0));
+        let high = (volts / k).max(0.0);
         if lack(high) < 0.0 {
             return high;
         }
-        // the torque of the motor falls with the rate and that of the propeller rises: one crossing, by halving to rounding
-        for _ in 0..60 {
-            let middle = 0.5 * (low + high);
-            if lack(middle) < 0.0 { low = middle } else { high = middle }
-        }
-        0.5 * (low + high)
+        // the torque of the motor falls with the rate and that of the propeller rises: one crossing, or the air turns
+        // nothing
+        bracketed_root(lack, 0.0, high, 0.0).unwrap_or(0.0)
     }
 }
 

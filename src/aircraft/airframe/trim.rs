@@ -1,7 +1,8 @@
 //! Steady flight: straight, climbing or turning, over the flat earth in still air.
 //!
-//! Eight unknowns α, β, φ, θ, δe, δa, δr, δt; p = −ψ̇ sin θ, q = ψ̇ sin φ cos θ, r = ψ̇ cos φ cos θ. Eight equations: the six accelerations vanish,
-//! ḣ = V sin γ, and one on the sideways motion. Newton's method from the angles of a point mass.
+//! Eight unknowns α, β, φ, θ, δe, δa, δr, δt; p = −ψ̇ sin θ, q = ψ̇ sin φ cos θ, r = ψ̇ cos φ cos θ. Eight equations:
+//! the six accelerations vanish, ḣ = V sin γ, and one on the sideways motion. Newton's method from the angles of a
+//! point mass; `numerics::optimize` has no systems of equations.
 
 use nalgebra::{SMatrix, SVector};
 

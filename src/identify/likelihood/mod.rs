@@ -43,7 +43,7 @@ pub(super) use growth::{LONGEST_AVERAGE, MOST_POLES};
 use interval::{Precision, completed, drift_precisions};
 use names::{name_of, parameter_name, term_name, unit_of};
 use ordinates::Ordinates;
-use whittle::Fit;
+use whittle::{FAST, Fit};
 use words::Words;
 
 /// Points of the shown Allan curve per decade of averaging time.
@@ -54,8 +54,6 @@ const CLOSE: f64 = 6.0;
 const CLEARLY: f64 = 3.0;
 /// Candidates whose parameters are looked at, at most.
 const LOOKED_AT: usize = 12;
-/// A Gauss-Markov process that forgets within so many samples is a matter of the sensor's bandwidth, not drift.
-const FAST: f64 = 10.0;
 /// Candidates that are tried on the part of the log they have not seen.
 const HELD_OUT: usize = 6;
 /// Standard deviation of a logarithm below which second differences of the exact likelihood give its interval.

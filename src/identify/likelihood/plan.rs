@@ -11,11 +11,11 @@ use serde::Serialize;
 
 use super::super::shape::Role;
 use super::form::Form;
-use super::interval::covariance;
 use super::names::name_of;
 use super::ordinates::Ordinates;
 use super::{parameter_name, whittle};
 use crate::noise::{Grid, Kind, NoiseModel, Term};
+use crate::numerics::optimize::covariance;
 use crate::signal::lines::Line;
 
 /// The longest log that is thought of: ten years, s.

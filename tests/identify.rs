@@ -2,6 +2,7 @@
 
 mod command;
 mod gmwm;
+mod hold;
 mod law;
 mod likelihood;
 mod plan;

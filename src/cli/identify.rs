@@ -9,7 +9,7 @@ mod words;
 
 use std::path::{Path, PathBuf};
 
-use anyhow::bail;
+use anyhow::{Context, bail};
 use clap::ValueEnum;
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -25,14 +25,14 @@ use crate::allan::wavelet::{self, Level};
 use crate::export::atomic;
 use crate::identify::graphical::Step;
 use crate::identify::{
-    Between, Candidate, Identified, Method, ModelChoice, Precision, SharedTime, Tails, TimeProfile, identify_axis,
-    identify_logs, parse_model, recent, shared_time,
+    Between, Candidate, Hold, HoldCost, Identified, Method, ModelChoice, Precision, SharedTime, Tails, TimeProfile,
+    identify_axis, identify_logs, parse_model, recent, shared_time,
 };
 use crate::input::{InputKind, LogOptions, TemperatureColumn};
 use crate::params::{NotIdentified, Params, Source};
 use crate::replay::axes::RATE_TOLERANCE;
 use crate::signal::{LogCheck, Recording};
-use crate::units::Quantity;
+use crate::units::{Quantity, amount};
 
 /// Noise parameters from a log at rest, with intervals
 ///
@@ -56,6 +56,10 @@ pub struct Args {
     /// also osc, ma (ma2 … ma64: an average over so many samples) and, in the place of white, bl (bl1 … bl6: a band limit of so many poles))
     #[arg(long, value_name = "MODEL", default_value = "auto")]
     model: String,
+    /// Keep a parameter at a value while the others are found: gauss_markov.correlation_time=200s, of every axis or of
+    /// one (x.gauss_markov.correlation_time=200s); what that costs is said. The terms are chosen without it
+    #[arg(long, value_name = "NAME=VALUE")]
+    hold: Vec<String>,
     /// Read the log in windows of this length and multiply their likelihoods, for logs too long for memory: 24h, 30min
     /// [default: whole; files above 4 GiB in windows of 10 000 000 samples]
     #[arg(long, value_name = "DURATION", allow_hyphen_values = true)]
@@ -150,6 +154,9 @@ struct AxisDocument<'a> {
     exact_log_likelihood: Option<f64>,
     steps: &'a [Step],
     warnings: &'a [String],
+    /// Where parameters are held: what that costs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    hold: Option<&'a HoldCost>,
     /// Likelihood only, where the log has a temperature.
     #[serde(skip_serializing_if = "Option::is_none")]
     temperature: Option<temperature::Document<'a>>,
@@ -234,6 +241,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if args.logs.len() > 1 && args.method != MethodArg::Likelihood {
         bail!("{} logs: only --method likelihood takes more than one", args.logs.len());
     }
+    if let Some(hold) = args.hold.first().filter(|_| args.method != MethodArg::Likelihood) {
+        bail!("--hold {hold}: only --method likelihood holds parameters");
+    }
+    let holds = args.hold.iter().map(|text| hold(text)).collect::<anyhow::Result<Vec<Hold>>>()?;
     let outputs =
         [("-o", &args.output, Kind::Json), ("--report", &args.report, Kind::Html), ("--plot", &args.plot, Kind::Svg)];
     files::check(&outputs, &args.logs.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
@@ -245,9 +256,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         Some(column) if args.method == MethodArg::Likelihood => TemperatureColumn::Named(column.into()),
         Some(column) => bail!("--temperature {column}: only --method likelihood has a regression on temperature"),
     };
-    let (log, axes) = match windows::axes(args, &choice, &options)? {
+    let (log, axes) = match windows::axes(args, &choice, &holds, &options)? {
         Some(found) => found,
-        None => whole(args, &choice, &options)?,
+        None => whole(args, &choice, &holds, &options)?,
     };
     let params = Params {
         quantity: log.quantity,
@@ -261,7 +272,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
             span_s: Some(log.checks.iter().map(|check| check.span_s).sum()),
             method: Some(args.method.method().name().into()),
             version: Some(env!("CARGO_PKG_VERSION").into()),
-            note: None,
+            note: held_note(&args.hold),
             inflation: Vec::new(),
             checks: checks::checks(&log.checks, &axes),
             between_logs: axes.iter().flat_map(|axis| words::between_logs(&axis.found)).collect(),
@@ -290,7 +301,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
 }
 
 /// The logs in memory at once.
-fn whole(args: &Args, choice: &ModelChoice, options: &LogOptions) -> anyhow::Result<(Log, Vec<Axis>)> {
+fn whole(args: &Args, choice: &ModelChoice, holds: &[Hold], options: &LogOptions) -> anyhow::Result<(Log, Vec<Axis>)> {
     let mut readings = Vec::with_capacity(args.logs.len());
     for log in &args.logs {
         let (recording, check) = crate::input::read(log, options)?;
@@ -313,6 +324,7 @@ fn whole(args: &Args, choice: &ModelChoice, options: &LogOptions) -> anyhow::Res
     };
     let dt = recording.dt();
     let parts = by_axis(&args.logs, &readings, options.kind)?;
+    let names: Vec<String> = parts.iter().map(|logs| logs[0].name.clone()).collect();
     if parts.is_empty() {
         bail!("{}: no axis to work on", args.logs[0].display());
     }
@@ -321,7 +333,8 @@ fn whole(args: &Args, choice: &ModelChoice, options: &LogOptions) -> anyhow::Res
     let axes: Vec<Axis> = parts
         .into_par_iter()
         .map(|part| {
-            let axis = identify(part, dt, args, choice, &log, warmth.as_ref());
+            let holds = holds_of(holds, &part[0].name, &names);
+            let axis = identify(part, dt, args, &Wanted { choice, holds: &holds }, &log, warmth.as_ref());
             bar.inc(1);
             axis
         })
@@ -333,6 +346,38 @@ fn whole(args: &Args, choice: &ModelChoice, options: &LogOptions) -> anyhow::Res
         }
     }
     Ok((log, axes))
+}
+
+/// "gauss_markov.correlation_time=200s".
+fn hold(text: &str) -> anyhow::Result<Hold> {
+    let expected =
+        || anyhow::anyhow!("--hold {text}: expected NAME=VALUE, for example gauss_markov.correlation_time=200s");
+    let (parameter, value) = text.split_once('=').ok_or_else(expected)?;
+    let (value, unit) = amount(value.trim()).ok_or_else(expected)?.with_context(|| format!("--hold {text}"))?;
+    Ok(Hold { parameter: parameter.trim().into(), value, unit })
+}
+
+/// What is held of one axis: what names it, and what names none of the axes.
+fn holds_of(holds: &[Hold], axis: &str, axes: &[String]) -> Vec<Hold> {
+    let named = |hold: &Hold, axis: &str| {
+        hold.parameter.strip_prefix(axis).and_then(|rest| rest.strip_prefix('.')).map(String::from)
+    };
+    let of = |hold: &Hold| match named(hold, axis) {
+        Some(parameter) => Some(Hold { parameter, ..hold.clone() }),
+        None => (!axes.iter().any(|other| named(hold, other).is_some())).then(|| hold.clone()),
+    };
+    holds.iter().filter_map(of).collect()
+}
+
+/// That the parameters in the document are not the log's alone.
+fn held_note(holds: &[String]) -> Option<String> {
+    (!holds.is_empty()).then(|| format!("held: {}", holds.join(", ")))
+}
+
+/// What is asked for of an axis.
+struct Wanted<'a> {
+    choice: &'a ModelChoice,
+    holds: &'a [Hold],
 }
 
 fn file_name(path: &Path) -> String {
@@ -375,7 +420,7 @@ fn identify(
     mut parts: Vec<Stretch>,
     dt: f64,
     args: &Args,
-    choice: &ModelChoice,
+    wanted: &Wanted<'_>,
     log: &Log,
     warmth: Option<&temperature::Warmth>,
 ) -> anyhow::Result<Axis> {
@@ -391,9 +436,9 @@ fn identify(
     let mut found = if method == Method::Likelihood {
         let logs: Vec<_> = parts.iter().map(Stretch::pieces).collect();
         let stretches: Vec<&[f64]> = parts.iter().map(|part| &part.rate[..]).collect();
-        identify_logs(&part.name, &stretches, &logs, dt, &part.unit, choice)?
+        identify_logs(&part.name, &stretches, &logs, dt, &part.unit, wanted.choice, wanted.holds)?
     } else {
-        identify_axis(&part.name, &part.rate, dt, &part.unit, method, choice)?
+        identify_axis(&part.name, &part.rate, dt, &part.unit, method, wanted.choice)?
     };
     if args.robust {
         let used = if method == Method::Likelihood { &parts[..] } else { std::slice::from_ref(part) };
@@ -464,6 +509,7 @@ fn document<'a>(params: &'a Params, axes: &'a [Axis], log: &'a Log, method: Meth
         exact_log_likelihood: a.found.exact_log_likelihood,
         steps: &a.found.steps,
         warnings: &a.found.warnings,
+        hold: a.found.hold.as_ref(),
         temperature: a.warmth.as_ref().map(temperature::Shown::document),
         tails: a.found.tails,
         between_logs: &a.found.between,
@@ -502,6 +548,9 @@ const STEPS: [&str; 4] = ["step", "formula", "value", "unit"];
 fn text(axis: &Axis, quantity: Quantity) -> String {
     let parameters = tables::parameters(axis, quantity);
     let mut out = format!("{}\n{}", headline(axis), table(parameters.header, &parameters.rows));
+    if let Some(hold) = &axis.found.hold {
+        out += &format!("{}\n", hold.sentence());
+    }
     if let Some(candidates) = tables::candidates(&axis.found.candidates) {
         out += &format!("\n{}:\n{}", candidates.caption, table(candidates.header, &candidates.rows));
     }

@@ -60,7 +60,7 @@ struct Estimate {
 
 fn of_axis(axis: &AxisParams, log: &LogAxis, dt: f64, display: &Unit) -> Result<Vec<Beside>, CompareError> {
     let identify = |choice: &ModelChoice| {
-        let found = identify_logs(&axis.name, &[&log.rate], &[log.pieces()], dt, display, choice);
+        let found = identify_logs(&axis.name, &[&log.rate], &[log.pieces()], dt, display, choice, &[]);
         found.map_err(|e| CompareError::Axis { axis: log.name.clone(), message: e.to_string() })
     };
     let mut file = axis.clone();

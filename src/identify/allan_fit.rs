@@ -90,6 +90,7 @@ pub(super) fn identify(
         candidates: candidates(&table, fit),
         precision: vec![],
         exact_log_likelihood: None,
+        hold: None,
         time_profile: None,
         fitted: None,
         sums: super::Sums::default(),

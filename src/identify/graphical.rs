@@ -117,6 +117,7 @@ pub(super) fn identify(name: &str, rate: &[f64], dt: f64, display: &Unit) -> Res
         candidates: vec![],
         precision: vec![],
         exact_log_likelihood: None,
+        hold: None,
         time_profile: None,
         fitted: None,
         sums: super::Sums::default(),

@@ -13,6 +13,7 @@ mod weighted_fit;
 
 pub use likelihood::between::Between;
 pub use likelihood::follow::{Followed, Follower};
+pub use likelihood::hold::{Held, Hold, HoldCost};
 pub use likelihood::maximum::maximum;
 pub use likelihood::recent::{Recent, recent};
 pub use likelihood::{Fitted, plan, temperature, windows};
@@ -137,6 +138,8 @@ pub struct Identified {
     pub tails: Tails,
     /// Of several logs: whether they differ.
     pub between: Vec<Between>,
+    /// Likelihood only: what holding parameters costs.
+    pub hold: Option<HoldCost>,
     /// Likelihood only, with one Gauss-Markov process: to compare the axes.
     pub time_profile: Option<TimeProfile>,
     pub not_identified: Vec<NotIdentified>,
@@ -240,7 +243,7 @@ pub fn identify_axis(
         Method::Gmwm => allan_fit::identify(name, rate, dt, display, choice, Distance::Variances),
         Method::Likelihood => {
             let whole = [vec![Stretch { missing: 0, samples: rate }]];
-            likelihood::identify(name, &[rate], &whole, dt, display, choice)
+            likelihood::identify(name, &[rate], &whole, dt, display, choice, &[])
         }
     };
     Ok(found?.with_tails(&[rate], dt))
@@ -249,7 +252,7 @@ pub fn identify_axis(
 /// The same by maximum likelihood from logs with gaps, or from several logs of one sensor, each with its own bias.
 ///
 /// `stretches`: of each log samples without gaps; on those of them that have the most samples when they are cut to one length the terms are chosen.
-/// `logs` are all samples, stretch by stretch.
+/// `logs` are all samples, stretch by stretch. `holds`: parameters that keep a value.
 pub fn identify_logs(
     name: &str,
     stretches: &[&[f64]],
@@ -257,8 +260,9 @@ pub fn identify_logs(
     dt: f64,
     display: &Unit,
     choice: &ModelChoice,
+    holds: &[Hold],
 ) -> Result<Identified, IdentifyError> {
-    Ok(likelihood::identify(name, stretches, logs, dt, display, choice)?
+    Ok(likelihood::identify(name, stretches, logs, dt, display, choice, holds)?
         .with_tails(stretches, dt)
         .with_spread(stretches))
 }

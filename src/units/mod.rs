@@ -3,6 +3,7 @@
 //! Inside kfdesign every number is SI (rad, m, s, K). Conversion happens once, at the edges, by a [`Unit`].
 //! `parse` holds the grammar, `symbol` the table of names, `dimension` the words for what a dimension is.
 
+mod amount;
 mod dimension;
 mod parse;
 mod plain;
@@ -13,6 +14,7 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use amount::amount;
 pub use plain::{plain, plain_lines};
 use symbol::Symbol;
 

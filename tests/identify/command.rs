@@ -53,7 +53,7 @@ fn command_writes_what_the_library_finds() {
         assert_eq!(bridged.is_some(), i == 1);
         let rate = bridged.unwrap_or_else(|| axes[i].clone());
         let whole = [vec![Stretch { missing: 0, samples: &axes[i] }]];
-        let expected = identify_logs(&axis.name, &[&rate], &whole, 0.1, &unit, &ModelChoice::Auto).unwrap();
+        let expected = identify_logs(&axis.name, &[&rate], &whole, 0.1, &unit, &ModelChoice::Auto, &[]).unwrap();
         assert_eq!(*axis, Params::from_json(&bench.read("params.json"), "p").unwrap().axes[i]);
         assert_eq!(axis.terms.len(), expected.params.terms.len());
         for (a, b) in axis.noise().terms.iter().zip(&expected.model.terms) {

@@ -67,7 +67,7 @@ fn identified(rate: &[f64], robust: bool) -> Identified {
     let outliers = upsets::fill_outliers(&mut filled);
     outliers.iter().for_each(|i| whole[*i] = f64::NAN);
     let logs = [vec![Stretch { missing: 0, samples: &whole }]];
-    let mut found = identify_logs("x", &[&filled], &logs, DT, &unit, &choice).unwrap();
+    let mut found = identify_logs("x", &[&filled], &logs, DT, &unit, &choice, &[]).unwrap();
     found.put_tails_back(&[&filled], &[&outliers], DT);
     found
 }
@@ -168,7 +168,7 @@ fn group(densities: &[f64], samples: usize, run: u64) -> Identified {
     let logs: Vec<Vec<Stretch<'_>>> = rates.iter().map(|rate| vec![Stretch { missing: 0, samples: rate }]).collect();
     let stretches: Vec<&[f64]> = rates.iter().map(|rate| &rate[..]).collect();
     let (unit, choice) = (Unit::parse("rad/s").unwrap(), parse_model("white+gm").unwrap());
-    identify_logs("x", &stretches, &logs, DT, &unit, &choice).unwrap()
+    identify_logs("x", &stretches, &logs, DT, &unit, &choice, &[]).unwrap()
 }
 
 /// Densities spread by this in ln about `N`.

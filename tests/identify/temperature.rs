@@ -16,7 +16,7 @@ fn warming(seconds: f64) -> f64 {
 }
 
 fn fit(logs: &[Vec<Stretch<'_>>], rate: &[f64], model: &str) -> Identified {
-    identify_logs("x", &[rate], logs, 1.0, &Unit::parse("rad/s").unwrap(), &parse_model(model).unwrap()).unwrap()
+    identify_logs("x", &[rate], logs, 1.0, &Unit::parse("rad/s").unwrap(), &parse_model(model).unwrap(), &[]).unwrap()
 }
 
 fn regress(

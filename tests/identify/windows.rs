@@ -23,7 +23,7 @@ fn in_windows(rate: &[f64], samples: usize, times: usize) -> Identified {
         rate.chunks_exact(samples).for_each(|window| windows.add(window).unwrap());
     }
     assert_eq!((windows.len(), windows.is_empty()), (rate.len() / samples * times, false));
-    windows.identify(&parse_model("white+gm").unwrap()).unwrap()
+    windows.identify(&parse_model("white+gm").unwrap(), &[]).unwrap()
 }
 
 /// Values of N, sigma and Tc.

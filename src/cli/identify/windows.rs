@@ -2,18 +2,19 @@
 
 use anyhow::bail;
 
-use super::{Args, Axis, Log, MethodArg};
+use super::{Args, Axis, Log, MethodArg, holds_of};
 use crate::cli::allan::AxisCurve;
 use crate::cli::stretch;
 use crate::cli::windows::{Windows, note};
-use crate::identify::ModelChoice;
 use crate::identify::windows::Windows as Likelihoods;
+use crate::identify::{Hold, ModelChoice};
 use crate::input::{LogOptions, TemperatureColumn};
 
 /// The axes in windows, if `--window` or the size of the file asks for it.
 pub(super) fn axes(
     args: &Args,
     choice: &ModelChoice,
+    holds: &[Hold],
     options: &LogOptions,
 ) -> anyhow::Result<Option<(Log, Vec<Axis>)>> {
     let other = match () {
@@ -45,11 +46,12 @@ pub(super) fn axes(
         axes.iter().map(|(name, unit)| Likelihoods::new(name, samples, dt, unit)).collect();
     let left_out =
         windows.read(|axis, values| Ok(likelihoods[axis].add(&stretch::rate(values, options.kind, dt))?))?;
+    let names: Vec<String> = axes.iter().map(|(name, _)| name.clone()).collect();
     let mut found = Vec::with_capacity(axes.len());
     for (((name, unit), likelihood), left_out) in axes.into_iter().zip(likelihoods).zip(left_out) {
         let count = likelihood.len();
         let said = note(&name, count as u64, &length, left_out, "whose likelihoods are multiplied")?;
-        let mut identified = likelihood.identify(choice)?;
+        let mut identified = likelihood.identify(choice, &holds_of(holds, &name, &names))?;
         identified.warnings.push(format!("{said}; outliers, steps and a temperature were not looked for"));
         log.warn_of_motion(&name, &mut identified);
         let (curve, fit) = (identified.curve.clone(), Ok(identified.model.clone()));

@@ -59,7 +59,7 @@ pub(super) fn precisions(data: &Ordinates, fit: &Fit) -> Vec<Precision> {
 
 /// The same, but for what is no drift from the observed information alone: enough to say what the log tells of its drift.
 pub(super) fn drift_precisions(data: &Ordinates, fit: &Fit) -> Vec<Precision> {
-    let bounds = whittle::bounds_around(data, &fit.form, &fit.logs);
+    let bounds = fit.bounds(data);
     let ended = ended(fit, &bounds);
     // what is at an end of its range has no curvature there, and is held while others are told
     let inside: Vec<usize> = (0..fit.logs.len()).filter(|i| !ended[*i]).collect();
@@ -95,7 +95,7 @@ pub(super) fn drift_precisions(data: &Ordinates, fit: &Fit) -> Vec<Precision> {
 
 /// All that is known, from what [`drift_precisions`] gave.
 pub(super) fn completed(data: &Ordinates, fit: &Fit, known: &[Precision]) -> Vec<Precision> {
-    let bounds = whittle::bounds_around(data, &fit.form, &fit.logs);
+    let bounds = fit.bounds(data);
     let ended = ended(fit, &bounds);
     let roles = fit.form.roles();
     let rough = if fit.form.has(Kind::BandLimit) { ROUGH_BESIDE_A_FILTER } else { ROUGH[1] };
@@ -175,7 +175,7 @@ pub(super) fn shortest(fit: &Fit, bounds: &[(f64, f64)], i: usize) -> bool {
 /// At least two processes with a parameter of more than 100 % standard deviation, or at the shortest correlation time that is searched. Not those without an end: a steady tone
 /// has no width to be known.
 pub(super) fn vague(data: &Ordinates, fit: &Fit, known: &[Precision]) -> bool {
-    let bounds = whittle::bounds_around(data, &fit.form, &fit.logs);
+    let bounds = fit.bounds(data);
     let roles = fit.form.roles();
     let unsure = |i: usize| {
         let sigma = known[i].sigma;
@@ -296,7 +296,7 @@ mod tests {
         let (data, fit) = fitted(1);
         for (index, value) in fit.logs.iter().enumerate() {
             for first in [0.1, -0.1] {
-                let mut bounds = whittle::bounds_around(&data, &fit.form, &fit.logs);
+                let mut bounds = fit.bounds(&data);
                 bounds[index] = (*value, *value);
                 assert_eq!(profile(&data, &fit, index, first, &bounds, NORMAL_95), Err(0.0), "{index}");
             }

@@ -9,6 +9,7 @@ mod exact;
 pub(super) mod follow;
 mod form;
 mod growth;
+pub(super) mod hold;
 mod interval;
 pub(super) mod maximum;
 mod names;
@@ -40,6 +41,7 @@ use exact::{Exact, Refined};
 use form::{Form, Piece};
 use growth::score;
 pub(super) use growth::{LONGEST_AVERAGE, MOST_POLES};
+use hold::{Hold, HoldCost};
 use interval::{Precision, completed, drift_precisions};
 use names::{name_of, parameter_name, term_name, unit_of};
 use ordinates::Ordinates;
@@ -69,6 +71,7 @@ pub(super) fn identify(
     dt: f64,
     display: &Unit,
     choice: &ModelChoice,
+    holds: &[Hold],
 ) -> Result<Identified, IdentifyError> {
     let rates = same_length(stretches);
     let failed = |message: String| IdentifyError { message: format!("{name}: {message}") };
@@ -90,7 +93,7 @@ pub(super) fn identify(
     };
     let (curve, found) = rayon::join(allan, search);
     let curve = curve.map_err(|e| failed(e.to_string()))?;
-    let found = found.ok_or_else(nothing)?;
+    let found = found.ok_or_else(nothing)?.holding(holds, name, display, logs)?;
     Whole { name, samples: rate.len(), level: mean(rate), dt, display, choice }.identified(found, curve)
 }
 
@@ -119,7 +122,7 @@ impl Whole<'_> {
         let &Whole { name, samples, level, dt, display, choice } = self;
         let failed = |message: String| IdentifyError { message: format!("{name}: {message}") };
         let forced = *choice != ModelChoice::Auto;
-        let Candidates { data, fits, held_out, chosen, refined, biases } = found;
+        let Candidates { data, fits, held_out, chosen, refined, biases, hold } = found;
         let used = data.samples * data.windows as usize;
         let (Some((on_cosines, _)), Some((fitted, refined))) = (fits.get(chosen), refined) else {
             let asked = |kind: Kind| matches!(choice, ModelChoice::Terms { kinds, .. } if kinds.contains(&kind));
@@ -183,7 +186,9 @@ impl Whole<'_> {
                 not_identified: not_identified.clone(),
             },
             precision: known_precision(&terms),
-            time_profile: shared::TimeProfile::new(&data, on_cosines),
+            // of what the log says by itself
+            time_profile: shared::TimeProfile::new(&data, on_cosines).filter(|_| hold.is_none()),
+            hold,
             fitted: Some(fitted.clone()),
             sums,
             tails: crate::identify::Tails::default(),
@@ -215,6 +220,8 @@ struct Candidates {
     refined: Option<(Fitted, Option<Refined>)>,
     /// Of each log; empty for one whose exact likelihood was not searched.
     biases: Vec<LogLikelihood>,
+    /// Where parameters are held.
+    hold: Option<HoldCost>,
 }
 
 /// `parts`: the log in an earlier and a later part, where it can be cut; `logs`: for the exact likelihood, if that is to have the last word.
@@ -244,7 +251,7 @@ fn choose(
             whole(&data, &mut fits, chosen);
             let refined = refined(&fits, chosen);
             let biases = biases(&refined);
-            Candidates { data, fits, held_out, chosen, refined, biases }
+            Candidates { data, fits, held_out, chosen, refined, biases, hold: None }
         }
         // what is held out chooses nothing
         ModelChoice::Terms { .. } => {
@@ -252,7 +259,7 @@ fn choose(
             whole(&data, &mut fits, 0);
             let (refined, held_out) = rayon::join(|| refined(&fits, 0), || held_out(parts(), &fits));
             let biases = biases(&refined);
-            Candidates { data, fits, held_out, chosen: 0, refined, biases }
+            Candidates { data, fits, held_out, chosen: 0, refined, biases, hold: None }
         }
     }
 }
@@ -316,7 +323,7 @@ fn refine(
     start: &Fit,
     logs: &[Vec<Stretch<'_>>],
 ) -> (Fitted, Option<Refined>) {
-    let bounds = whittle::bounds_around(data, &start.form, &start.logs);
+    let bounds = start.bounds(data);
     let exact = Exact::new(data, &start.form, &start.logs, logs).filter(|_| !logs.is_empty());
     let refined = exact.and_then(|exact| exact.refine(&start.logs, &bounds));
     // a steady tone is no oscillation of any width that is searched: there the two likelihoods differ by more than either knows
@@ -350,7 +357,7 @@ fn moved(
 ) -> Vec<Precision> {
     let samples: usize = logs.iter().flatten().map(|part| part.samples.len()).sum();
     let more = samples as f64 * data.dt / data.total_s();
-    let ended = interval::ended(before, &whittle::bounds_around(data, &before.form, &before.logs));
+    let ended = interval::ended(before, &before.bounds(data));
     let inside: Vec<usize> = (0..ended.len()).filter(|i| !ended[*i]).collect();
     let sigmas = refined.information.as_ref().map(|all| interval::deviations_of(all, &inside));
     let endless = interval::endless(&before.form, known);
@@ -443,9 +450,11 @@ struct Found {
 /// The terms but for drift that is not identified.
 fn known_terms(data: &Ordinates, fit: &Fit, known: &[Precision]) -> Vec<Found> {
     let unknown = unknown(data, fit, known);
-    let bounds = whittle::bounds_around(data, &fit.form, &fit.logs);
+    let bounds = fit.bounds(data);
     // the shortest that is searched is no estimate
-    let interval = |i: usize| known[i].interval().filter(|_| !interval::shortest(fit, &bounds, i));
+    // nor is what was given
+    let interval =
+        |i: usize| known[i].interval().filter(|_| !interval::shortest(fit, &bounds, i) && !fit.held.contains(&i));
     let mut first = 0;
     let mut found = Vec::new();
     for (piece, own) in fit.form.split(&fit.logs) {

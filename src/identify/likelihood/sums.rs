@@ -39,7 +39,7 @@ const STEP: f64 = 1e-4;
 /// `information`: of the logarithms, where it is better known than by the cosine coefficients.
 pub(super) fn sums(data: &Ordinates, fit: &Fit, information: Option<&DMatrix<f64>>) -> Sums {
     let information = information.cloned().unwrap_or_else(|| whittle::observed_information(data, fit));
-    let covariance = covariance(&information);
+    let covariance = covariance_holding(&information, &fit.held);
     let sum = |square: &dyn Fn(&[f64]) -> f64| root(square, &fit.logs, covariance.as_ref());
     // which drift is fast is decided once, not anew at every step
     let fast: Vec<bool> = fit.form.terms(&fit.logs).map(|term| counts_as_white(&term, data.dt)).collect();
@@ -50,6 +50,17 @@ pub(super) fn sums(data: &Ordinates, fit: &Fit, information: Option<&DMatrix<f64
         white: sum(&|logs| over(logs, true, &|term| term.psd(0.0, data.dt))),
         walk: sum(&|logs| over(logs, false, &growth)).filter(|_| !fit.form.has(Kind::BiasInstability)),
     }
+}
+
+/// Where `held` are known: their rows and columns are zero.
+fn covariance_holding(information: &DMatrix<f64>, held: &[usize]) -> Option<DMatrix<f64>> {
+    let free: Vec<usize> = (0..information.nrows()).filter(|i| !held.contains(i)).collect();
+    let part = covariance(&information.select_rows(&free).select_columns(&free))?;
+    let mut all = DMatrix::zeros(information.nrows(), information.ncols());
+    for (i, row) in free.iter().enumerate() {
+        free.iter().enumerate().for_each(|(k, column)| all[(*row, *column)] = part[(i, k)]);
+    }
+    Some(all)
 }
 
 /// Variance per second over times that are short beside the correlation time.

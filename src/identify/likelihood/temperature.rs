@@ -357,7 +357,7 @@ fn best_noise(data: &Ordinates, from: &Fit) -> Option<Fit> {
         if drift { log - std::f64::consts::LN_10 } else { *log }
     });
     let starts = [from.logs.clone(), lower.collect()];
-    let fits = starts.par_iter().filter_map(|start| whittle::climb_all(data, &from.form, start));
+    let fits = starts.par_iter().filter_map(|start| from.climb_from(data, start));
     fits.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
 }
 

@@ -50,6 +50,8 @@ pub(super) struct Fit {
     pub(super) log_likelihood: f64,
     /// gᵀ (I + 1/reach²)⁻¹ g: what another step would still gain, twice, in log-likelihood.
     pub(super) decrement: f64,
+    /// Which logarithms keep a value that was given.
+    pub(super) held: Vec<usize>,
 }
 
 /// Spectrum and derivatives by the logarithms at every bin.
@@ -63,6 +65,19 @@ impl Fit {
     /// At every bin, without a ramp.
     pub(super) fn spectrum(&self, data: &Ordinates) -> Vec<f64> {
         spectrum_of(data, &self.form, &self.logs)
+    }
+
+    /// What is searched around the fit, wide enough to hold it; what is held does not move.
+    pub(super) fn bounds(&self, data: &Ordinates) -> Vec<(f64, f64)> {
+        let mut bounds = bounds_around(data, &self.form, &self.logs);
+        self.held.iter().for_each(|i| bounds[*i] = (self.logs[*i], self.logs[*i]));
+        bounds
+    }
+
+    /// The maximum from a start with this form; what is held stays there.
+    pub(super) fn climb_from(&self, data: &Ordinates, start: &[f64]) -> Option<Fit> {
+        let free: Vec<usize> = (0..start.len()).filter(|i| !self.held.contains(i)).collect();
+        Some(Fit { held: self.held.clone(), ..climb(data, &self.form, start, &free)? })
     }
 }
 
@@ -312,7 +327,7 @@ pub(super) fn bounds(data: &Ordinates, form: &Form, start: &[f64]) -> Vec<(f64, 
 
 /// The same around a place, as wide as to hold it: a line that has moved on to wider bins than those around its start is narrower than what would be searched
 /// there, and a search from it that begins with another correlation time begins lower.
-pub(super) fn bounds_around(data: &Ordinates, form: &Form, logs: &[f64]) -> Vec<(f64, f64)> {
+fn bounds_around(data: &Ordinates, form: &Form, logs: &[f64]) -> Vec<(f64, f64)> {
     let wide = |((low, high), at): ((f64, f64), &f64)| (low.min(*at), high.max(*at));
     bounds(data, form, logs).into_iter().zip(logs).map(wide).collect()
 }
@@ -480,5 +495,5 @@ fn finish(data: &Ordinates, form: &Form, logs: Vec<f64>, value: f64, free: &[usi
     let decrement = nalgebra::Cholesky::new(part)
         .map_or(f64::NAN, |c| (g.transpose() * c.solve(&g)).get(0).copied().unwrap_or(0.0));
     let (slope, _) = slope(data, form, &spectrum.total);
-    Fit { form: form.clone(), logs, slope, log_likelihood: -value, decrement }
+    Fit { form: form.clone(), logs, slope, log_likelihood: -value, decrement, held: vec![] }
 }

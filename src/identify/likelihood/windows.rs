@@ -5,6 +5,7 @@
 //! 1948 for the average of periodograms). Each window has its own mean; windows count as independent, and what is slower than a window is not seen.
 
 use super::super::tails::{MOST_SEGMENTS, SEGMENT};
+use super::hold::Hold;
 use super::ordinates::Ordinates;
 use super::{Candidates, FITTED_SHARE, Identified, IdentifyError, ModelChoice, Whole, choose, usable};
 use crate::allan::{Deviation, Pooled, TauGrid, deviation};
@@ -96,7 +97,7 @@ impl Windows {
 
     /// Terms chosen, parameters and intervals as from a log held at once, but for the last step on the exact likelihood. What is held out is the
     /// last third of the groups. Fails without a window.
-    pub fn identify(self, choice: &ModelChoice) -> Result<Identified, IdentifyError> {
+    pub fn identify(self, choice: &ModelChoice, holds: &[Hold]) -> Result<Identified, IdentifyError> {
         let Windows { name, display, dt, groups, count, level, curve, beginnings, .. } = self;
         let Some(data) = Ordinates::pooled(&groups) else {
             return Err(IdentifyError { message: format!("{name}: no window of the log is whole") });
@@ -111,7 +112,7 @@ impl Windows {
             display: &display,
             choice,
         };
-        let found: Candidates = choose(data, choice, &parts, &[]);
+        let found: Candidates = choose(data, choice, &parts, &[]).holding(holds, &name, &display, &[])?;
         let beginnings: Vec<&[f64]> = beginnings.iter().map(|own| &own[..]).collect();
         Ok(whole.identified(found, curve.curve())?.with_tails(&beginnings, dt))
     }

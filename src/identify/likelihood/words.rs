@@ -59,7 +59,7 @@ impl Words<'_> {
             (None, Some(high)) => format!("below {} (95 %); the {span} s log sets no lower limit", value(high)),
             (None, None) => format!("the {span} s log bounds it on no side"),
         };
-        let bounds = whittle::bounds_around(self.data, &fit.form, &fit.logs);
+        let bounds = fit.bounds(self.data);
         let reason = match shortest(fit, &bounds, index) {
             true => format!("at the shortest that is searched, {}; {reason}", value(fit.logs[index])),
             false => reason,

@@ -8,7 +8,7 @@ use crate::support::Bench;
 
 fn together(logs: &[Vec<Stretch<'_>>], stretches: &[&[f64]], model: &str) -> Identified {
     let choice = parse_model(model).unwrap();
-    identify_logs("x", stretches, logs, 1.0, &Unit::parse("rad/s").unwrap(), &choice).unwrap()
+    identify_logs("x", stretches, logs, 1.0, &Unit::parse("rad/s").unwrap(), &choice, &[]).unwrap()
 }
 
 /// Ten hours at 1 Hz, of which three gaps take a tenth, and one sample is not a number. What the stretches say together is known as
@@ -60,7 +60,7 @@ fn the_turn_on_bias_of_long_logs_is_told_too() {
     let logs: Vec<Vec<Stretch<'_>>> = all.iter().map(|x| vec![Stretch { missing: 0, samples: x }]).collect();
     let stretches: Vec<&[f64]> = all.iter().map(|x| &x[..]).collect();
     let unit = Unit::parse("rad/s").unwrap();
-    let found = identify_logs("x", &stretches, &logs, 0.01, &unit, &parse_model("bl2+gm").unwrap()).unwrap();
+    let found = identify_logs("x", &stretches, &logs, 0.01, &unit, &parse_model("bl2+gm").unwrap(), &[]).unwrap();
     assert!(found.exact_log_likelihood.is_none(), "the search was on the exact likelihood");
     assert!((found.params.turn_on_bias.unwrap().si() - 1.0).abs() < 0.05);
     assert!(found.params.bias.unwrap().si().abs() < 0.05);

@@ -19,7 +19,7 @@ fn with_one_missing(rate: &[f64]) -> Identified {
     let pieces = vec![Stretch { missing: 0, samples: early }, Stretch { missing: 1, samples: late }];
     let mut filled = rate.to_vec();
     filled[1800] = 0.5 * (rate[1799] + rate[1801]);
-    identify_logs("x", &[&filled], &[pieces], 1.0, &Unit::parse("rad/s").unwrap(), &ModelChoice::Auto).unwrap()
+    identify_logs("x", &[&filled], &[pieces], 1.0, &Unit::parse("rad/s").unwrap(), &ModelChoice::Auto, &[]).unwrap()
 }
 
 /// An hour of the reference sensor, 18 correlation times. A random walk is a Gauss-Markov process whose correlation time has no end: white+gm is identified

@@ -111,7 +111,7 @@ pub struct AllanCurve {
 pub enum AllanError {
     #[error("{samples} samples are too few for a deviation: at least {needed} are needed")]
     TooShort { samples: usize, needed: usize },
-    #[error("sample {index} is not finite: cut the log with --start/--end")]
+    #[error("sample {index} is not finite: cut the log with `start`/`end`")]
     NotFinite { index: usize },
 }
 

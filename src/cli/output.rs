@@ -1,8 +1,11 @@
 //! Tables, JSON, progress: how every command speaks.
 
+use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::io::{ErrorKind, IsTerminal, Write};
 use std::sync::OnceLock;
 
+use clap::CommandFactory;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
@@ -19,12 +22,47 @@ static LOST: OnceLock<String> = OnceLock::new();
 pub fn print_json<T: Serialize>(value: &T) -> anyhow::Result<()> {
     let mut text = serde_json::to_string_pretty(value)?;
     text.push('\n');
-    print_text(&text);
+    print(&text);
     Ok(())
+}
+
+/// What the library calls an option, `start`, as a shell knows it: --start.
+pub fn with_flags(text: &str) -> Cow<'_, str> {
+    static FLAGS: OnceLock<BTreeSet<String>> = OnceLock::new();
+    let all = || {
+        let command = super::Cli::command();
+        let longs = command.get_subcommands().flat_map(|command| command.get_arguments()).filter_map(|a| a.get_long());
+        longs.map(String::from).collect()
+    };
+    if !text.contains('`') {
+        return Cow::Borrowed(text);
+    }
+    let flags = FLAGS.get_or_init(all);
+    let mut parts = text.split('`');
+    let mut out = parts.next().unwrap_or_default().to_string();
+    // a word between two marks, or not
+    let mut opened = true;
+    for part in parts {
+        let flag = part.replace('_', "-");
+        if opened && flags.contains(&flag) {
+            out += &format!("--{flag}");
+            opened = false;
+        } else if opened {
+            out += &format!("`{part}");
+        } else {
+            out += part;
+            opened = true;
+        }
+    }
+    Cow::Owned(out)
 }
 
 /// Text on stdout. Nothing here changes what the work has found: see [`exit_status`].
 pub fn print_text(text: &str) {
+    print(&with_flags(text));
+}
+
+fn print(text: &str) {
     let mut out = std::io::stdout().lock();
     let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
     if let Err(error) = written
@@ -37,7 +75,7 @@ pub fn print_text(text: &str) {
 
 /// A line on stderr. Who does not listen misses it.
 pub fn say(line: &str) {
-    let _ = writeln!(std::io::stderr().lock(), "{line}");
+    let _ = writeln!(std::io::stderr().lock(), "{}", with_flags(line));
 }
 
 /// The same of several lines, each with its end.
@@ -156,5 +194,20 @@ pub fn shown_unit(si: &str, quantity: Quantity, unit: &Unit) -> (f64, String) {
     match family.into_iter().find(|unit| dimension == Ok(unit.dimension())) {
         Some(unit) => (unit.scale(), unit.to_string()),
         None => (1.0, si.to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Options that no command has, and marks without a partner, stay as they are.
+    #[test]
+    fn options_are_flags() {
+        assert_eq!(with_flags("cut it with `start`/`end`"), "cut it with --start/--end");
+        assert_eq!(with_flags("give `allow_zero_walk`"), "give --allow-zero-walk");
+        assert_eq!(with_flags("`rate`"), "--rate");
+        assert_eq!(with_flags("a `word`, a ` and `rate` HZ"), "a `word`, a ` and --rate HZ");
+        assert_eq!(with_flags("no marks"), "no marks");
     }
 }

@@ -108,7 +108,7 @@ pub fn inflation(params: &Params, log: &Log, from_hz: f64) -> Result<Inflation, 
     let nyquist = 0.5 * log.sample_rate_hz;
     if !(from_hz > 0.0 && from_hz < nyquist) {
         let expected = format!("above 0 and below half the sample rate, {} Hz", digits(nyquist));
-        return Err(CompareError::Option { flag: "--from", value: from_hz, expected });
+        return Err(CompareError::Option { flag: "`from`", value: from_hz, expected });
     }
     let axes = paired(params, log)?
         .into_iter()
@@ -163,7 +163,7 @@ fn inflation_of(
     let count = ratios.values.len();
     if count < FEWEST {
         return Err(failed(format!(
-            "{count} spectral coefficients above {} Hz are too few: at least {FEWEST} are needed; use a longer log or a lower --from",
+            "{count} spectral coefficients above {} Hz are too few: at least {FEWEST} are needed; use a longer log or a lower `from`",
             digits(from_hz)
         )));
     }
@@ -307,7 +307,7 @@ fn not_flat(bands: &[Band], z: &[f64], bound: f64) -> Option<String> {
     let shown =
         |band: &Band| format!("{} at {} to {} Hz", digits(band.ratio.sqrt()), digits(band.from_hz), digits(band.to_hz));
     let advice = if std::ptr::eq(most, &bands[0]) {
-        "motion may reach into the band: try a higher --from"
+        "motion may reach into the band: try a higher `from`"
     } else {
         "white noise times one factor is a rough picture of it"
     };

@@ -69,11 +69,11 @@ pub struct Log {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CompareError {
     #[error(
-        "the log is in {log} but the parameters are for {params}: choose the columns with --columns or --sensor, or give the right parameters"
+        "the log is in {log} but the parameters are for {params}: choose the columns with `columns` or `sensor`, or give the right parameters"
     )]
     Quantity { log: &'static str, params: &'static str },
     #[error(
-        "cannot tell which axis is which: the log has {log}, the parameters have {params}; choose with --columns, in the order of the parameters' axes"
+        "cannot tell which axis is which: the log has {log}, the parameters have {params}; choose with `columns`, in the order of the parameters' axes"
     )]
     Axes { log: String, params: String },
     #[error("axis '{axis}': {message}")]
@@ -175,7 +175,7 @@ pub fn check_alpha(alpha: f64) -> Result<(), CompareError> {
     if alpha > 0.0 && alpha < 1.0 {
         return Ok(());
     }
-    Err(CompareError::Option { flag: "--alpha", value: alpha, expected: "between 0 and 1".into() })
+    Err(CompareError::Option { flag: "`alpha`", value: alpha, expected: "between 0 and 1".into() })
 }
 
 /// Axes of the parameters with theirs of the log, each fit to be worked with.

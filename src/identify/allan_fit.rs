@@ -56,7 +56,7 @@ pub(super) fn identify(
     };
     let fit = fit.ok_or_else(|| match &forced {
         Some(shape) => failed(format!(
-            "{} samples give {} points of the Allan curve: too few for {} parameters ({}); use a longer log or a smaller --model",
+            "{} samples give {} points of the Allan curve: too few for {} parameters ({}); use a longer log or a smaller `model`",
             rate.len(),
             points.len(),
             shape.parameters(),
@@ -336,7 +336,7 @@ impl Words<'_> {
             };
             warnings.push(format!(
                 "averaging times below {} s left out: {why}, and N of shorter times would feel it; the deviation of single samples is {:+.0} % off the model, so \
-                 neighbouring innovations of a filter at this rate will not be white (--method likelihood looks for filters and lines)",
+                 neighbouring innovations of a filter at this rate will not be white (`method` likelihood looks for filters and lines)",
                 digits(first),
                 percent
             ));

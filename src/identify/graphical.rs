@@ -95,7 +95,7 @@ pub(super) fn identify(name: &str, rate: &[f64], dt: f64, display: &Unit) -> Res
     curve.refine(&model);
     let steps = steps(&reading, &curve, &model, dt, display);
     let mut warnings = vec![
-        "the graphical recipe gives no intervals and is biased on its own model (see the cost of each step); --method allan is \
+        "the graphical recipe gives no intervals and is biased on its own model (see the cost of each step); `method` allan is \
          nearly unbiased on the same log"
             .to_string(),
     ];

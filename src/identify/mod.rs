@@ -76,7 +76,7 @@ impl ModelChoice {
         let ModelChoice::Terms { kinds, .. } = self else { return None };
         let kind = kinds.iter().find(|kind| !shape::in_allan_curve(**kind))?;
         Some(format!(
-            "{} needs --method likelihood: averages of the log do not show it apart from white noise",
+            "{} needs `method` likelihood: averages of the log do not show it apart from white noise",
             shape::short_name(*kind)
         ))
     }
@@ -272,7 +272,7 @@ pub fn parse_model(text: &str) -> Result<ModelChoice, IdentifyError> {
     if text.trim() == "auto" {
         return Ok(ModelChoice::Auto);
     }
-    let failed = |message: String| IdentifyError { message: format!("--model {text}: {message}") };
+    let failed = |message: String| IdentifyError { message: format!("`model` {text}: {message}") };
     let known = || shape::KINDS.map(shape::short_name).join(", ");
     let mut kinds = Vec::new();
     let (mut average, mut order) = (None, None);
@@ -329,11 +329,11 @@ fn usable(name: &str, rate: &[f64]) -> Result<(), IdentifyError> {
         ));
     }
     if let Some(index) = rate.iter().position(|x| !x.is_finite()) {
-        return failed(format!("sample {index} is not finite: cut the log with --start/--end"));
+        return failed(format!("sample {index} is not finite: cut the log with `start`/`end`"));
     }
     if rate.iter().all(|x| *x == rate[0]) {
         return failed(format!(
-            "constant ({} in SI units, {} samples): a sensor that says the same all the time has no noise to identify; check the column, or name the others with --columns",
+            "constant ({} in SI units, {} samples): a sensor that says the same all the time has no noise to identify; check the column, or name the others with `columns`",
             digits(rate[0]),
             rate.len()
         ));

@@ -132,7 +132,7 @@ fn white(sheet: &Datasheet, said: &mut Said) -> Result<Measured, String> {
             Some((density, rule))
         }
         (Some(total), None) => {
-            return Err(format!("total noise {} needs its bandwidth: give --bandwidth", shown(total)));
+            return Err(format!("total noise {} needs its bandwidth: give `bandwidth`", shown(total)));
         }
         (None, _) => None,
     };
@@ -149,7 +149,7 @@ fn white(sheet: &Datasheet, said: &mut Said) -> Result<Measured, String> {
         (Some(density), None) if walk.is_none() => {
             return Err(format!(
                 "the noise density {} may be one-sided (deviation in a band = density sqrt(band), as spectrum analysers show it) or two-sided (as an angle random walk \
-                 is): a factor of sqrt(2) in N. Give --sided one or --sided two, or the angle random walk beside it, which tells",
+                 is): a factor of sqrt(2) in N. Give `sided` one or `sided` two, or the angle random walk beside it, which tells",
                 shown(density)
             ));
         }
@@ -179,7 +179,7 @@ fn white(sheet: &Datasheet, said: &mut Said) -> Result<Measured, String> {
     let mut found = [of_walk, of_density, of_total].into_iter().flatten();
     let (n, rule) = found
         .next()
-        .ok_or("no white noise: give --angle-random-walk, --noise-density or --total-noise with --bandwidth")?;
+        .ok_or("no white noise: give `angle_random_walk`, `noise_density` or `total_noise` with `bandwidth`")?;
     said.rule(rule);
     for (other, rule) in found {
         let ratio = other.si() / n.si();
@@ -209,7 +209,7 @@ fn drift(sheet: &Datasheet, said: &mut Said) -> Result<Option<TermEntry>, String
     let Some(given) = &sheet.bias_instability else {
         return match &sheet.correlation_time {
             Some(time) => Err(format!(
-                "a correlation time of {} without a bias instability: give --bias-instability",
+                "a correlation time of {} without a bias instability: give `bias_instability`",
                 shown(time)
             )),
             None => Ok(None),
@@ -223,7 +223,7 @@ fn drift(sheet: &Datasheet, said: &mut Said) -> Result<Option<TermEntry>, String
         ),
         Instability::Sigma => {
             let time =
-                sheet.correlation_time.clone().ok_or("a bias instability that is a sigma needs --correlation-time")?;
+                sheet.correlation_time.clone().ok_or("a bias instability that is a sigma needs `correlation_time`")?;
             said.rule(format!(
                 "bias instability {}: the sigma of a Gauss-Markov drift of Tc = {}",
                 shown(given),

@@ -69,7 +69,7 @@ pub(super) fn parse(entries: &[Entry], rate_hz: Option<f64>) -> Result<Imported,
     if let (Some(given), Some((entry, hertz))) = (rate_hz, in_file)
         && given != hertz
     {
-        warnings.push(format!("{} is {hertz}, --rate {given} stands before it", entry.key));
+        warnings.push(format!("{} is {hertz}, `rate` {given} stands before it", entry.key));
     }
     let (mut sensors, mut rules) = (Vec::new(), Vec::new());
     for (quantity, white_key, walk_key) in &family.keys {

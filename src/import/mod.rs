@@ -36,7 +36,7 @@ pub enum ImportError {
     Line { path: String, line: usize, message: String },
     #[error("{path}: {message}")]
     File { path: String, message: String },
-    #[error("{path}: {why}: give the sample rate, for example --rate 200")]
+    #[error("{path}: {why}: give the sample rate, for example `rate` 200")]
     Rate { path: String, why: String },
 }
 

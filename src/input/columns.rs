@@ -142,7 +142,7 @@ impl Table<'_> {
             columns.push(column);
         }
         if columns.is_empty() {
-            return self.fail("--columns is empty");
+            return self.fail("`columns` is empty");
         }
         Ok(columns)
     }
@@ -179,7 +179,7 @@ impl Table<'_> {
             return match self.heads.len() {
                 1 => Ok(vec![0]),
                 n => self.fail(format!(
-                    "no header names the {n} columns; say which with --columns, for example --columns 1,2,3"
+                    "no header names the {n} columns; say which with `columns`, for example `columns` 1,2,3"
                 )),
             };
         }
@@ -204,14 +204,14 @@ impl Table<'_> {
         };
         let Some(first) = candidates.first() else {
             return self.fail(format!(
-                "no {sensor} column is known by its name or unit; say which with --columns; {}",
+                "no {sensor} column is known by its name or unit; say which with `columns`; {}",
                 self.there_are()
             ));
         };
         if candidates.iter().any(|c| c.stem != first.stem) {
             let names: Vec<String> = candidates.iter().map(|c| format!("'{}'", self.heads[c.column].full)).collect();
             return self
-                .fail(format!("more than one sensor could be meant: {}; choose with --columns", names.join(", ")));
+                .fail(format!("more than one sensor could be meant: {}; choose with `columns`", names.join(", ")));
         }
         Ok(candidates.iter().map(|c| c.column).collect())
     }
@@ -244,7 +244,7 @@ impl Table<'_> {
                 (Some(header), Some(flag)) if !same(header, flag) => {
                     let full = &head.full;
                     return self.fail(format!(
-                        "column '{full}' is in {header} by its header, but --unit says {flag}; drop one of them"
+                        "column '{full}' is in {header} by its header, but `unit` says {flag}; drop one of them"
                     ));
                 }
                 (_, Some(flag)) => flag.clone(),
@@ -257,7 +257,7 @@ impl Table<'_> {
                         },
                         None => format!("the header gives no unit for column '{}'", head.full),
                     };
-                    return self.fail(format!("{why}; say it with --unit, for example --unit deg/s"));
+                    return self.fail(format!("{why}; say it with `unit`, for example `unit` deg/s"));
                 }
             };
             let wanted = quantity.or_else(|| quantity_of(&unit, options.kind)).unwrap_or_else(|| {
@@ -267,10 +267,10 @@ impl Table<'_> {
             if let Err(error) = unit.require(dimension(wanted, options.kind)) {
                 let hint = match options.kind {
                     InputKind::Rate if unit.dimension() == wanted.dimension().times_time(2) => {
-                        "; increments or an integrated angle are read with --input increments or --input angle"
+                        "; increments or an integrated angle are read with `input` increments or `input` angle"
                     }
                     InputKind::Increments | InputKind::Angle if unit.dimension() == wanted.dimension() => {
-                        "; a rate is read without --input"
+                        "; a rate is read without `input`"
                     }
                     _ => "",
                 };
@@ -297,7 +297,7 @@ impl Table<'_> {
         let unit = match (&head.unit, flag) {
             (Some(header), Some(flag)) if !same(header, &flag) => {
                 return self
-                    .fail(format!("column '{}' is in {header} by its header, but --time says {flag}", head.full));
+                    .fail(format!("column '{}' is in {header} by its header, but `time` says {flag}", head.full));
             }
             (Some(unit), _) => unit.clone(),
             (None, Some(flag)) => flag,
@@ -306,11 +306,11 @@ impl Table<'_> {
             (None, None) => {
                 let name = &head.full;
                 let or = match self.rate_hz {
-                    Some(rate) => format!("take the {rate} Hz that the file says with --time none"),
-                    None => "give --rate HZ".into(),
+                    Some(rate) => format!("take the {rate} Hz that the file says with `time` none"),
+                    None => "give `rate` HZ".into(),
                 };
                 return self.fail(format!(
-                    "time column '{name}' has no unit; say it with --time '{name}:s' (or ms, us, ns), or {or}"
+                    "time column '{name}' has no unit; say it with `time` '{name}:s' (or ms, us, ns), or {or}"
                 ));
             }
         };
@@ -323,7 +323,7 @@ impl Table<'_> {
     fn no_time(&self, options: &LogOptions) -> Result<Option<(usize, Unit)>, InputError> {
         match options.rate_hz.or(self.rate_hz) {
             Some(_) => Ok(None),
-            None => self.fail("no sample rate: no time column is used; give --rate HZ, or --time COLUMN"),
+            None => self.fail("no sample rate: no time column is used; give `rate` HZ, or `time` COLUMN"),
         }
     }
 
@@ -355,7 +355,7 @@ impl Table<'_> {
             _ if options.rate_hz.is_some() => Ok(None),
             _ => {
                 let names: Vec<String> = hits.iter().map(|&i| format!("'{}'", self.heads[i].full)).collect();
-                self.fail(format!("several columns could be the time: {}; choose with --time", names.join(", ")))
+                self.fail(format!("several columns could be the time: {}; choose with `time`", names.join(", ")))
             }
         }
     }

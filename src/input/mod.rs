@@ -177,15 +177,15 @@ impl Log {
     fn open(path: &Path, options: &LogOptions) -> Result<Log, InputError> {
         let fail = |what: &str| Err(InputError { message: format!("{}: {what}", path.display()) });
         if options.rate_hz.is_some_and(|rate| !rate.is_finite() || rate <= 0.0) {
-            return fail("--rate must be a positive number of Hz");
+            return fail("`rate` must be a positive number of Hz");
         }
         if [options.start_s, options.end_s].iter().flatten().any(|t| !t.is_finite() || *t < 0.0) {
-            return fail("--start and --end are seconds from the start of the log, 0 or more");
+            return fail("`start` and `end` are seconds from the start of the log, 0 or more");
         }
         if let (Some(start), Some(end)) = (options.start_s, options.end_s)
             && start >= end
         {
-            return fail("--start must be before --end");
+            return fail("`start` must be before `end`");
         }
         let (mut table, note) = source::choose(path, source::open(path)?, options)?;
         let (named, place, rate) = (table.named(), table.place(), table.rate());
@@ -233,7 +233,7 @@ impl Log {
         let table = columns::Table { heads: &heads, named: self.table.named(), place: "", rate_hz: None };
         InputError {
             message: format!(
-                "{}, column '{}': the time stamp is empty; choose another with --time{}, or give --rate HZ",
+                "{}, column '{}': the time stamp is empty; choose another with `time`{}, or give `rate` HZ",
                 self.table.row_place(rows.line(empty)),
                 heads[column].full,
                 table.other_times(column)
@@ -330,7 +330,7 @@ impl Log {
                     let origin = self.choice.time.as_ref().map_or(0.0, |(_, unit)| unit.to_si(self.table.origin()));
                     return Ok(Scan { check, gaps, first_s, start_s: origin + first_s });
                 }
-                Outcome::NoTime => return self.fail("the time stamps do not advance; give --rate HZ to ignore them"),
+                Outcome::NoTime => return self.fail("the time stamps do not advance; give `rate` HZ to ignore them"),
                 Outcome::Again { period_s } => {
                     period = Some(period_s);
                     self.table.rewind()?;
@@ -345,7 +345,7 @@ impl Log {
 
     fn enough(&self, rows: u64, selection: &Selection) -> Result<(), InputError> {
         match rows {
-            0 if selection.seen > 0 => self.fail("no sample lies between --start and --end"),
+            0 if selection.seen > 0 => self.fail("no sample lies between `start` and `end`"),
             0 => self.fail("no rows of numbers"),
             1 => self.fail("there is only one sample; at least two are needed"),
             _ => Ok(()),
@@ -355,7 +355,7 @@ impl Log {
     fn backward(&self, back: &BackwardStamp, line: u64) -> InputError {
         InputError {
             message: format!(
-                "{}: time goes back from {:.6} s to {:.6} s after the start of the log; stop before it with --end, or give --rate HZ to ignore the stamps",
+                "{}: time goes back from {:.6} s to {:.6} s after the start of the log; stop before it with `end`, or give `rate` HZ to ignore the stamps",
                 self.table.row_place(line),
                 back.from_s,
                 back.to_s

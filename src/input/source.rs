@@ -140,7 +140,7 @@ pub(super) fn choose(
             }
             Some(topic) => Ok((source.table(topic)?, None)),
             None if topics.len() == 1 && topics[0].name.is_empty() => {
-                fail(format!("--topic {wanted}: this is {} with one table; drop the flag", source.format()))
+                fail(format!("`topic` {wanted}: this is {} with one table; drop the flag", source.format()))
             }
             None => fail(format!("no topic '{wanted}'; {}", there_are(topics))),
         };
@@ -173,7 +173,7 @@ pub(super) fn choose(
             };
             let others: Vec<String> = others.iter().map(|&i| name(i)).collect();
             let note = (!others.is_empty())
-                .then(|| format!("topic {} is read; --topic chooses another: {}", name(taken), others.join(", ")));
+                .then(|| format!("topic {} is read; `topic` chooses another: {}", name(taken), others.join(", ")));
             return Ok((source.table(taken)?, note));
         }
     }
@@ -183,7 +183,7 @@ pub(super) fn choose(
         (None, [Quantity::SpecificForce]) => "no topic has an accelerometer known by its name or unit".into(),
         _ => "no topic has a gyro or an accelerometer known by its name or unit".into(),
     };
-    fail(format!("{wanted}; choose with --topic and --columns; {}", there_are(topics)))
+    fail(format!("{wanted}; choose with `topic` and `columns`; {}", there_are(topics)))
 }
 
 /// `there are imu (100 rows: time gyro_x gyro_y), …`, those with a sensor first; columns only where the list stays short.

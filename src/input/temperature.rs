@@ -52,7 +52,7 @@ impl Table<'_> {
         let unit = match (&head.unit, flag) {
             (Some(header), Some(flag)) if !same(header, &flag) => {
                 return self.fail(format!(
-                    "column '{}' is in {header} by its header, but --temperature says {flag}",
+                    "column '{}' is in {header} by its header, but `temperature` says {flag}",
                     head.full
                 ));
             }
@@ -64,7 +64,7 @@ impl Table<'_> {
                     None => "has no unit".into(),
                 };
                 return self.fail(format!(
-                    "temperature column '{0}' {found}; say it with --temperature \"{0}:degC\" (or K, degF)",
+                    "temperature column '{0}' {found}; say it with `temperature` \"{0}:degC\" (or K, degF)",
                     head.full
                 ));
             }
@@ -97,7 +97,7 @@ impl Table<'_> {
                         Temperature { column: Some((column, info)), note: None }
                     }
                     None => Temperature::passed_over(format!(
-                        "column '{0}' looks like a temperature, but its unit is not known; say it with --temperature \"{0}:degC\" (or K, degF)",
+                        "column '{0}' looks like a temperature, but its unit is not known; say it with `temperature` \"{0}:degC\" (or K, degF)",
                         head.full
                     )),
                 }
@@ -105,7 +105,7 @@ impl Table<'_> {
             _ => {
                 let names: Vec<String> = hits.iter().map(full).collect();
                 Temperature::passed_over(format!(
-                    "several columns could be the temperature: {}; choose with --temperature",
+                    "several columns could be the temperature: {}; choose with `temperature`",
                     names.join(", ")
                 ))
             }

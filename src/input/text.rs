@@ -131,7 +131,7 @@ impl TextTable {
                 let fields = if count == 1 { "1 field" } else { &format!("{count} fields") };
                 let wanted = self.form.slots.len();
                 let cut =
-                    if cut { " (the file ends inside this line: remove it, or stop before it with --end)" } else { "" };
+                    if cut { " (the file ends inside this line: remove it, or stop before it with `end`)" } else { "" };
                 format!(": {fields} where {wanted} are expected{cut}")
             }
             Fault::TooLong => " is longer than 1 MiB: this is no text log".into(),

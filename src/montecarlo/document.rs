@@ -79,7 +79,7 @@ pub fn to_json(experiment: &Experiment, outcome: &Outcome, totals: &[Totals]) ->
 pub fn partial_json(experiment: &Experiment, course: &Course, runs: Runs, totals: &[Totals]) -> String {
     let outcome = Outcome {
         verdict: Verdict::Inconclusive,
-        meaning: format!("{} runs are done; go on with --resume, or judge them with kfdesign merge", runs.count()),
+        meaning: format!("{} runs are done; go on with `resume`, or judge them with kfdesign merge", runs.count()),
         alpha: experiment.alpha,
         runs,
         steps: experiment.steps,

@@ -119,7 +119,7 @@ pub(super) fn unsettled(course: &Course) -> String {
         return String::new();
     }
     format!(
-        "; runs of {} s end before the filter has settled: {}; judged is the way there, not the settled filter, which a longer --duration judges",
+        "; runs of {} s end before the filter has settled: {}; judged is the way there, not the settled filter, which a longer `duration` judges",
         digits(duration),
         slow.join(", ")
     )

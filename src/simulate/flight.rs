@@ -57,12 +57,12 @@ impl Flight {
             PlantEntry::Static => return Ok(None),
             PlantEntry::Custom(_) => {
                 let message = "the design is a custom plant: simulate moves the plants angle, rate and vertical; leave the design out with \
-                               --plant static, or judge the filter with montecarlo";
+                               `plant` static, or judge the filter with montecarlo";
                 return Err(SimulateError(message.into()));
             }
             PlantEntry::Attitude(_) => {
                 let message = "the design is the plant attitude: simulate moves the plants angle, rate and vertical; leave the design out with \
-                               --plant static";
+                               `plant` static";
                 return Err(SimulateError(message.into()));
             }
             PlantEntry::Angle { .. } | PlantEntry::Rate { .. } => (None, None),

@@ -69,7 +69,7 @@ pub enum TuneError {
     SteadyState { axis: String, source: SteadyStateError },
     #[error("axis '{axis}': {source}")]
     Linalg { axis: String, source: LinalgError },
-    #[error("axis '{axis}': nothing measures the {output}; give an aid, for example --aid \"2 deg @ 1 Hz\"")]
+    #[error("axis '{axis}': nothing measures the {output}; give an aid, for example `aid` \"2 deg @ 1 Hz\"")]
     NoAid { axis: String, output: String },
     #[error("{source}")]
     Attitude { source: ModelError },

@@ -110,7 +110,7 @@ fn plant_of(design: &Design, quantity: Quantity, dt: f64) -> Result<Plant, Model
 
 /// The attitude has a filter of its own.
 fn not_linear() -> ModelError {
-    let message = "'attitude' is not linear; its filter is made by `tune --plant attitude` and run by `replay` alone";
+    let message = "'attitude' is not linear; its filter is made by tune with `plant` attitude and run by replay alone";
     ModelError::Part { part: "plant".into(), message: message.into() }
 }
 

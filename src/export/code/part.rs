@@ -176,7 +176,7 @@ fn in_range(model: &LinearModel) -> Result<(), String> {
     for (name, a) in parts {
         if let Some(value) = a.iter().find(|v| **v != 0.0 && !SINGLE.contains(&v.abs())) {
             return Err(format!(
-                "{name} holds {}, which single precision does not carry; give --precision double",
+                "{name} holds {}, which single precision does not carry; give `precision` double",
                 digits(*value)
             ));
         }

@@ -22,7 +22,7 @@ pub(super) fn write(export: &Export, page: &mut Page) -> Result<(), String> {
         if sensor.axes.iter().any(|n| n.rate_random_walk > 0.0) {
             return Err(format!(
                 "the {name} has a rate random walk, which gnss-ins-sim does not have (its infinite correlation time is white noise); identify with \
-                 --model white+gm"
+                 `model` white+gm"
             ));
         }
         let found = export.processes(page, sensor, false, false)?;

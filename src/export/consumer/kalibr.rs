@@ -20,7 +20,7 @@ pub(super) fn write(export: &Export, page: &mut Page) -> Result<(), String> {
 pub(super) fn four(export: &Export, indent: &str, page: &mut Page) -> Result<(), String> {
     for (quantity, name, flag) in [
         (Quantity::AngularRate, "gyroscope", "the parameters of a gyro"),
-        (Quantity::SpecificForce, "accelerometer", "--accelerometer PARAMS"),
+        (Quantity::SpecificForce, "accelerometer", "`accelerometer` PARAMS"),
     ] {
         let unit = quantity.si_unit();
         let Some(white) = export.white(quantity)? else {

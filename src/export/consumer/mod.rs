@@ -221,7 +221,7 @@ fn clamped(name: &str, value: f64, low: f64, high: f64, warnings: &mut Vec<Strin
 fn lacking(quantity: Quantity) -> String {
     match quantity {
         Quantity::AngularRate => "the gyro is missing: give its parameters".into(),
-        Quantity::SpecificForce => "the accelerometer is missing: give --accelerometer PARAMS".into(),
+        Quantity::SpecificForce => "the accelerometer is missing: give `accelerometer` PARAMS".into(),
     }
 }
 

@@ -131,7 +131,7 @@ impl Sensor {
             }
             Choice::Axis(name) => self.axes.iter().find(|axis| axis.name == *name).map(&of).ok_or_else(|| {
                 let known: Vec<&str> = self.axes.iter().map(|axis| axis.name.as_str()).collect();
-                format!("--axis {name}: the axes are {}; expected one of them, worst or mean", known.join(", "))
+                format!("`axis` {name}: the axes are {}; expected one of them, worst or mean", known.join(", "))
             }),
         }
     }
@@ -234,7 +234,7 @@ impl Numbers {
             (Walk::Least, None) => {
                 let name = &axis.name;
                 return Err(format!(
-                    "axis '{name}': no filter with a walk settles in its drift; give --walk horizon=60s"
+                    "axis '{name}': no filter with a walk settles in its drift; give `walk` horizon=60s"
                 ));
             }
             (rule, _) => grown(&numbers.processes, rule),

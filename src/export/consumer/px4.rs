@@ -33,7 +33,7 @@ pub(super) fn write(export: &Export, page: &mut Page) -> Result<(), String> {
     }
     if export.accelerometer.is_none() {
         page.warnings
-            .push(missing("no accelerometer: only the gyro's parameters are written", "--accelerometer PARAMS"));
+            .push(missing("no accelerometer: only the gyro's parameters are written", "`accelerometer` PARAMS"));
     }
     Ok(())
 }

@@ -46,7 +46,7 @@ impl Export {
             return Ok(Some(value));
         }
         if self.allow_zero_walk {
-            page.warnings.push(format!("{} is 0: no drift is known, and --allow-zero-walk was given", field.name));
+            page.warnings.push(format!("{} is 0: no drift is known, and `allow_zero_walk` was given", field.name));
             return Ok(Some(0.0));
         }
         if field.default {
@@ -131,7 +131,7 @@ impl Export {
                 device(sensor.quantity),
                 digits(price.worst()),
                 digits(least),
-                if self.walk == Walk::Least { "" } else { " (--walk least)" }
+                if self.walk == Walk::Least { "" } else { " (`walk` least)" }
             ));
         }
     }
@@ -191,7 +191,7 @@ impl Export {
 fn no_drift(quantity: Quantity) -> String {
     format!(
         "the parameters of the {} have no drift and no upper limit of one, and the file needs a number: identify a log at rest of some hours, give \
-         rate_random_walk.density, or write zeros with --allow-zero-walk",
+         rate_random_walk.density, or write zeros with `allow_zero_walk`",
         device(quantity)
     )
 }

@@ -48,10 +48,10 @@ pub(super) fn note(axes: &[AxisWindows], rows: u64, clock: &Clock) -> Option<Not
     };
     let mut flags = Vec::new();
     if part.start > 0 {
-        flags.push(format!("--start {}", shown(clock.seconds(first), f64::ceil)));
+        flags.push(format!("`start` {}", shown(clock.seconds(first), f64::ceil)));
     }
     if part.end < rows {
-        flags.push(format!("--end {}", shown(clock.seconds(end), f64::floor)));
+        flags.push(format!("`end` {}", shown(clock.seconds(end), f64::floor)));
     }
     Some(Note {
         kind: "calm",
@@ -180,17 +180,17 @@ mod tests {
         shake(&mut x, 4000..5000);
         shake(&mut y, 12_500..13_500);
         // windows of 64 samples: the first after the shaking is at 5056, the next shaken one at 12480; and one less on both sides
-        assert_eq!(flags(&[x.clone(), y.clone()]), "--start 51.2 --end 124.1");
+        assert_eq!(flags(&[x.clone(), y.clone()]), "`start` 51.2 `end` 124.1");
         shake(&mut y, 17_000..17_010);
-        assert_eq!(flags(&[x.clone(), y.clone()]), "--start 51.2 --end 124.1");
+        assert_eq!(flags(&[x.clone(), y.clone()]), "`start` 51.2 `end` 124.1");
         shake(&mut x, 9000..9100);
-        assert_eq!(flags(&[x.clone(), y.clone()]), "--end 39.0", "from the start on");
+        assert_eq!(flags(&[x.clone(), y.clone()]), "`end` 39.0", "from the start on");
         assert_eq!(found(&[x.clone(), y.clone()], None).unwrap().count, 3904);
         // samples that are missing on one axis move its windows
         (100..130).for_each(|i| y[i] = f64::NAN);
-        assert_eq!(flags(&[x.clone(), y.clone()]), "--end 39.0");
+        assert_eq!(flags(&[x.clone(), y.clone()]), "`end` 39.0");
         shake(&mut y, 1000..1100);
-        assert_eq!(flags(&[x.clone(), y]), "--start 51.2 --end 88.9");
+        assert_eq!(flags(&[x.clone(), y]), "`start` 51.2 `end` 88.9");
         // motion that grows all the time
         (0..ROWS).for_each(|i| x[i] = (i as f64 / 5.0).sin() * 1.01_f64.powi(i as i32));
         assert_eq!(flags(&[x]), "none");
@@ -201,18 +201,18 @@ mod tests {
         let mut x = rest(2);
         // at rest for 30 s, then an even turn
         (3000..ROWS).for_each(|i| x[i] += 300.0);
-        assert_eq!(flags(&[x.clone()]), "--end 28.8");
+        assert_eq!(flags(&[x.clone()]), "`end` 28.8");
         // an offset of a converter is no turn
         x.iter_mut().for_each(|v| *v += 5000.0);
-        assert_eq!(flags(&[x]), "--start 30.8");
+        assert_eq!(flags(&[x]), "`start` 30.8");
         // another position, between two windows
         let mut x = rest(5);
         (3200..ROWS).for_each(|i| x[i] += 5.0);
-        assert_eq!(flags(&[x]), "--start 33.3");
+        assert_eq!(flags(&[x]), "`start` 33.3");
         // slow, and slowly changing
         let mut x = rest(3);
         shake(&mut x, 0..1000);
-        assert_eq!(flags(&[x.clone()]), "--start 10.9");
+        assert_eq!(flags(&[x.clone()]), "`start` 10.9");
         (0..ROWS).for_each(|i| x[i] += 20.0 * (i as f64 / 3000.0).sin());
         assert_eq!(flags(&[x]), "none");
     }
@@ -232,7 +232,7 @@ mod tests {
         let note = note(&axes, ROWS as u64, &Clock { stamped: true, rate_hz: RATE_HZ, offset_s: 0.0 }).unwrap();
         // the first window after the motion has 74 rows, 5056 to 5129, and is left out: 51.3 s and the gap
         assert_eq!((note.first.unwrap().index, note.count), (5130, ROWS as u64 - 5130), "{}", note.message);
-        assert!(note.message.contains("that --start 58.3 leaves"), "{}", note.message);
+        assert!(note.message.contains("that `start` 58.3 leaves"), "{}", note.message);
     }
 
     /// A hole of thousands of rows between two motions is no calm part.
@@ -255,7 +255,7 @@ mod tests {
         shake(&mut x, 9000..10_000);
         (10_000..ROWS).for_each(|i| x[i] = 0.0);
         // 960 is the first window that is not all of one value, and one less on that side; 8960 the first with motion
-        assert_eq!(flags(&[x]), "--start 10.3 --end 88.9");
+        assert_eq!(flags(&[x]), "`start` 10.3 `end` 88.9");
     }
 
     /// The longest part without motion has values of two axes only; then the next is named.
@@ -264,8 +264,8 @@ mod tests {
         let [mut x, mut y] = [rest(9), rest(10)];
         shake(&mut x, 5000..6000);
         (6500..ROWS).for_each(|i| y[i] = f64::NAN);
-        assert_eq!(flags(&[x.clone()]), "--start 60.8");
-        assert_eq!(flags(&[x, y]), "--end 49.2");
+        assert_eq!(flags(&[x.clone()]), "`start` 60.8");
+        assert_eq!(flags(&[x, y]), "`end` 49.2");
     }
 
     /// Of noise of a fifth of a step, windows have none to five values of another step.
@@ -273,9 +273,9 @@ mod tests {
     fn steps_that_are_crossed_now_and_then_are_calm() {
         let mut x: Vec<f64> = rest(6).iter().map(|v| (0.2 * v).round()).collect();
         shake(&mut x, 15_000..16_000);
-        assert_eq!(flags_by(&[x.clone()], Some(1.0)), "--end 149.1");
+        assert_eq!(flags_by(&[x.clone()], Some(1.0)), "`end` 149.1");
         // but not where they are never crossed
         (0..15_000).for_each(|i| x[i] = 0.0);
-        assert_eq!(flags_by(&[x], Some(1.0)), "--start 160.7");
+        assert_eq!(flags_by(&[x], Some(1.0)), "`start` 160.7");
     }
 }

@@ -231,7 +231,7 @@ pub(super) fn choose(problem: &Problem<'_>, group: &Group, told: &mut Vec<AlsAxi
     };
     if model.every.iter().any(|&every| every != 1) {
         return Err(failed(
-            "als needs every measurement at every sample; use --objective likelihood where an aid is slower".into(),
+            "als needs every measurement at every sample; use `objective` likelihood where an aid is slower".into(),
         ));
     }
     let undriven = undriven_states(model);
@@ -252,7 +252,7 @@ pub(super) fn choose(problem: &Problem<'_>, group: &Group, told: &mut Vec<AlsAxi
         let more = &problem.models(group, &shifts)?[0];
         if more.states != model.states {
             let name = problem.space.name(group.free[k]);
-            return Err(failed(format!("the number of states depends on the size of {name}; hold it (--hold {name})")));
+            return Err(failed(format!("the number of states depends on the size of {name}; hold it (`hold` {name})")));
         }
         let more = more.part(&kept);
         let source = Source { q: &more.q - &part.q, r: &more.r - &part.r };
@@ -266,7 +266,7 @@ pub(super) fn choose(problem: &Problem<'_>, group: &Group, told: &mut Vec<AlsAxi
     if let Some(k) = found.sizes.iter().position(|size| *size <= 0.0) {
         let name = &names[k];
         return Err(failed(format!(
-            "the autocovariances of {samples} innovations show nothing of {name}: its variance is best zero; hold it (--hold {name}), leave its \
+            "the autocovariances of {samples} innovations show nothing of {name}: its variance is best zero; hold it (`hold` {name}), leave its \
              term out, or give a longer log"
         )));
     }

@@ -121,7 +121,7 @@ fn refuse_short(problem: &Problem<'_>, group: &Group) -> Result<(), ObjectiveErr
                 let name = problem.space.name(i);
                 return Err(wrong(format!(
                     "{} s to be fitted to are too short for {name} of {} s, of which no interval is known; give a log that holds it {} times \
-                     over, or hold it (--hold {name})",
+                     over, or hold it (`hold` {name})",
                     digits(span),
                     digits(time),
                     digits(LENGTHS_TO_TELL)

@@ -327,6 +327,9 @@ fn complaints(file: &str, source: &str) -> Vec<String> {
     if room != "cli" && has(&["anyhow"]) {
         out.push(format!("src/{file}: anyhow outside src/cli: give the room its own error type"));
     }
+    if room != "cli" && room != "main" && names_a_flag(source) {
+        out.push(format!("src/{file}: names a --flag: write `name` of the option, which src/cli/output.rs translates"));
+    }
     if file != "cli/output.rs" {
         for stream in ["stdout", "stderr"] {
             if has(&[stream, "("]) {
@@ -338,6 +341,16 @@ fn complaints(file: &str, source: &str) -> Vec<String> {
         out.push(format!("src/{file}: exit outside main.rs: return a status instead"));
     }
     out
+}
+
+/// A line of code, not of comment, in which two hyphens stand before a word and behind none.
+fn names_a_flag(source: &str) -> bool {
+    let code = source.lines().filter(|line| !line.trim_start().starts_with("//"));
+    code.flat_map(|line| line.match_indices("--").map(move |(at, _)| (line, at))).any(|(line, at)| {
+        let before = line[..at].chars().next_back();
+        let after = line[at + 2..].chars().next();
+        after.is_some_and(|c| c.is_ascii_lowercase()) && before.is_none_or(|c| !c.is_alphanumeric() && c != '-')
+    })
 }
 
 #[test]
@@ -436,6 +449,8 @@ fn each_rule_bites() {
     assert!(bites("kitchen.rs", ""));
     assert!(bites("tune/mod.rs", &"\n".repeat(LONGEST_FILE + 1)));
     assert!(!bites("tune/mod.rs", &"\n".repeat(LONGEST_FILE)));
+    assert!(bites("tune/mod.rs", "fn f() -> &'static str { \"give --log LOG\" }"));
+    assert!(!bites("tune/mod.rs", "// as --log LOG\nfn f() -> &'static str { \"3--x, a---b, `log`\" }"));
     for source in [
         "fn f() { println!(\"x\") }",
         "fn f() { eprint!() }",

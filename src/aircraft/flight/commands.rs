@@ -61,7 +61,7 @@ pub(super) fn read(
     let last = table.rows.last().map_or(0.0, |row| row.0);
     if last < duration {
         return Err(FlightError(format!(
-            "{}: ends at {last} s, before the {duration} s of the flight; add rows, or fly shorter with --duration",
+            "{}: ends at {last} s, before the {duration} s of the flight; add rows, or fly shorter with `duration`",
             table.shown
         )));
     }

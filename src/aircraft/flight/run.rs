@@ -92,7 +92,7 @@ impl Plan {
         if fastest * h > STABLE {
             return Err(FlightError(format!(
                 "a step of {h} s is too long for this airplane, whose fastest mode has {fastest:.1} rad/s: the integration would be unstable; \
-                 give --step {:.1e} s or less",
+                 give `step` {:.1e} s or less",
                 1.0 / fastest
             )));
         }
@@ -143,7 +143,7 @@ impl<'a> Flying<'a> {
 
     fn unstable(&self, time: f64) -> FlightError {
         FlightError(format!(
-            "at {time:.3} s: the integration is unstable with its step of {} s; give a shorter one with --step",
+            "at {time:.3} s: the integration is unstable with its step of {} s; give a shorter one with `step`",
             self.plan.step()
         ))
     }

@@ -102,7 +102,7 @@ fn on<T: Send>(threads: usize, work: impl Fn() -> T + Send) -> T {
 #[allow(clippy::print_stdout, reason = "the ratios are what the bench is for")]
 fn engine(criterion: &mut Criterion) {
     let (course, model) = (course(), design().axes[0].model.clone());
-    let all = |threads| on(threads, || black_box(course.sums(0..RUNS, &|_| ())));
+    let all = |threads| on(threads, || black_box(course.sums(0..RUNS)));
     let mut group = criterion.benchmark_group("Monte Carlo, 1000 runs of 10 000 steps, 2 states");
     group.throughput(Throughput::Elements(RUNS * STEPS)).sample_size(10);
     group.bench_function("one thread", |bench| bench.iter(|| all(1)));

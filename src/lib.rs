@@ -29,7 +29,7 @@
 //! }"#;
 //! let params = Params::from_json(text, "my gyro")?;
 //! let design = tune(&params, &TuneOptions::default())?.design;
-//! let outcome = montecarlo::verify(&design, &Plan::quick(design.sample_rate_hz), &|_| ())?;
+//! let outcome = montecarlo::verify(&design, &Plan::quick(design.sample_rate_hz))?;
 //! assert_eq!(outcome.verdict, Verdict::Consistent);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

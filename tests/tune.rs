@@ -6,10 +6,14 @@ mod objectives;
 mod under_truth;
 mod walk;
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use kfdesign::consistency::Verdict;
 use kfdesign::filter::FilterDesign;
 use kfdesign::montecarlo::{AxisOutcome, Plan, verify, verify_against};
 use kfdesign::noise::Term;
+use kfdesign::numerics::progress::{Progress, watched};
 use kfdesign::params::{AxisParams, Measured, Params, TermEntry};
 use kfdesign::tune::{TuneOptions, Tuned, sensor_model, tune};
 use kfdesign::units::{Quantity, Unit};
@@ -242,7 +246,7 @@ fn what_no_filter_can_tell_apart_is_one_state() {
     assert_eq!(model.f, nalgebra::dmatrix![1.0, 0.01; 0.0, 1.0]);
     assert_eq!(model.h, nalgebra::dmatrix![1.0, 0.0]);
     let plan = Plan { runs: 100, steps: 3000, seed: 3, alpha: 1e-5 };
-    let outcome = verify(&ramp.design, &plan, &|_| ()).unwrap();
+    let outcome = verify(&ramp.design, &plan).unwrap();
     assert_eq!(outcome.verdict, Verdict::Consistent, "{:?}", outcome.tests);
 }
 
@@ -344,7 +348,7 @@ fn every_shipped_sensor_tunes_and_verifies() {
         let steady = &tuned.design.axes[0].steady_state;
         assert!(steady.residual < 1e-9, "{}: {steady:?}", path.display());
         let plan = Plan { runs: 60, steps: 3000, seed: 5, alpha: 1e-5 };
-        let outcome = verify(&tuned.design, &plan, &|_| ()).unwrap();
+        let outcome = verify(&tuned.design, &plan).unwrap();
         assert_eq!(outcome.verdict, Verdict::Consistent, "{}: {:#?}", path.display(), outcome.tests);
         count += 1;
     }
@@ -359,7 +363,7 @@ fn the_verdict_has_its_false_alarm_probability() {
     let alarms = (0..400)
         .filter(|&seed| {
             let plan = Plan { runs: 20, steps: 300, seed, alpha: 0.05 };
-            verify(&tuned.design, &plan, &|_| ()).unwrap().verdict == Verdict::Inconsistent
+            verify(&tuned.design, &plan).unwrap().verdict == Verdict::Inconsistent
         })
         .count();
     println!("false alarms: {alarms} of 400");
@@ -372,13 +376,13 @@ fn a_wrong_design_is_caught() {
     params.axes.truncate(1);
     let truth = tuned(&params).design;
     let plan = Plan { seed: 7, ..Plan::quick(100.0) };
-    let outcome = verify(&truth, &plan, &|_| ()).unwrap();
+    let outcome = verify(&truth, &plan).unwrap();
     assert_eq!(outcome.verdict, Verdict::Consistent, "{:#?}", outcome.tests);
     assert_eq!(outcome.alpha, 1e-3);
     let wrong = |change: &dyn Fn(&mut kfdesign::model::LinearModel)| {
         let mut design = truth.clone();
         change(&mut design.axes[0].model);
-        verify_against(&design, &truth, &plan, &|_| ()).unwrap()
+        verify_against(&design, &truth, &plan).unwrap()
     };
     for (what, outcome) in [
         ("Q x 5", wrong(&|m| m.q *= 5.0)),
@@ -408,15 +412,15 @@ fn a_truth_of_other_states_is_judged_by_the_whole_drift() {
         matrix.swap_rows(0, 1);
         matrix.swap_columns(0, 1);
     }
-    let same = verify_against(&design, &reordered, &plan, &|_| ()).unwrap();
+    let same = verify_against(&design, &reordered, &plan).unwrap();
     assert_eq!(same.verdict, Verdict::Consistent, "{:#?}", same.tests);
     let walk = tuned(&sensor(10.0, vec![white(0.05), random_walk(1e-3)], Some(0.1))).design;
     let more = tuned(&sensor(10.0, vec![white(0.05), random_walk(1e-3), gauss_markov(0.03, 20.0)], Some(0.1))).design;
-    let missing = verify_against(&walk, &more, &plan, &|_| ()).unwrap();
+    let missing = verify_against(&walk, &more, &plan).unwrap();
     assert_eq!(missing.verdict, Verdict::Inconsistent, "{:#?}", missing.tests);
     let mut other_rate = design.clone();
     other_rate.sample_rate_hz = 20.0;
-    assert!(verify_against(&design, &other_rate, &plan, &|_| ()).unwrap_err().to_string().contains("20 Hz"));
+    assert!(verify_against(&design, &other_rate, &plan).unwrap_err().to_string().contains("20 Hz"));
 }
 
 #[test]
@@ -426,16 +430,16 @@ fn the_verification_is_the_same_for_any_number_of_threads_and_axes() {
     let design = tuned(&params).design;
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| serde_json::to_string(&verify(&design, &plan, &|_| ()).unwrap()).unwrap())
+        pool.install(|| serde_json::to_string(&verify(&design, &plan).unwrap()).unwrap())
     };
     let one = with(1);
     assert_eq!(one, with(4));
     // identical axes have their own random numbers; leaving one out changes no other
-    let outcome = verify(&design, &plan, &|_| ()).unwrap();
+    let outcome = verify(&design, &plan).unwrap();
     assert_ne!(outcome.axes[0].innovations[0].nis, outcome.axes[1].innovations[0].nis);
     let mut first = design.clone();
     first.axes.truncate(1);
-    let alone = verify(&first, &plan, &|_| ()).unwrap();
+    let alone = verify(&first, &plan).unwrap();
     // the bounds are those of fewer tests, the measured numbers are the same
     let measured = |axis: &AxisOutcome| {
         let innovations = &axis.innovations[0];
@@ -444,21 +448,26 @@ fn the_verification_is_the_same_for_any_number_of_threads_and_axes() {
         (axis.errors.clone(), axis.credibility.clone(), statistics)
     };
     assert_eq!(measured(&alone.axes[0]), measured(&outcome.axes[0]));
-    let other = verify(&design, &Plan { seed: 12, ..plan }, &|_| ()).unwrap();
+    let other = verify(&design, &Plan { seed: 12, ..plan }).unwrap();
     assert_ne!(other.axes[0].innovations[0].nis, outcome.axes[0].innovations[0].nis);
 }
 
 #[test]
 fn progress_counts_every_run() {
-    let count = std::sync::atomic::AtomicU64::new(0);
+    #[derive(Default)]
+    struct Count(AtomicU64);
+    impl Progress for Count {
+        fn advance(&self, parts: u64) {
+            self.0.fetch_add(parts, Ordering::Relaxed);
+        }
+    }
+    let count = Arc::new(Count::default());
+    let watch: Arc<dyn Progress> = Arc::clone(&count) as _;
     let plan = Plan { runs: 7, steps: 100, seed: 1, alpha: 1e-3 };
-    let add = |n| {
-        count.fetch_add(n, std::sync::atomic::Ordering::Relaxed);
-    };
-    verify(&tuned(&skydog()).design, &plan, &add).unwrap();
-    assert_eq!(count.into_inner(), 21);
+    watched(&watch, || verify(&tuned(&skydog()).design, &plan)).unwrap().unwrap();
+    assert_eq!(count.0.load(Ordering::Relaxed), 21);
     for plan in [Plan { runs: 1, ..plan }, Plan { steps: 3, ..plan }, Plan { alpha: 0.0, ..plan }] {
-        let message = verify(&tuned(&skydog()).design, &plan, &|_| ()).unwrap_err().to_string();
+        let message = verify(&tuned(&skydog()).design, &plan).unwrap_err().to_string();
         assert!(message.contains("expected"), "{message}");
     }
 }

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::moving::{self, second};
 pub use super::phase::phase;
 use super::{AllanError, Deviation, squares};
+use crate::numerics::progress::checkpoint;
 use crate::numerics::reduce::Sum;
 
 /// A variance (square of the deviation, SI²) and how many differences it is the mean of.
@@ -79,7 +80,11 @@ pub fn variances(deviation: Deviation, phase: &[f64], dt: f64, factors: &[u64]) 
     let (x, steps) = (phase, factors.iter().map(|m| *m as usize).collect::<Vec<usize>>());
     // without overlap, and at the ends, one factor is one loop
     let each = |sum: &(dyn Fn(usize, usize) -> f64 + Sync)| -> Vec<f64> {
-        steps.par_iter().zip(&counts).map(|(m, count)| sum(*m, *count as usize)).collect()
+        let one = |(m, count): (&usize, &u64)| {
+            checkpoint();
+            sum(*m, *count as usize)
+        };
+        steps.par_iter().zip(&counts).map(one).collect()
     };
     let squares = match deviation {
         Deviation::Adev => each(&|m, count| sum_of_squares(count, |k| second(x, k * m, m))),

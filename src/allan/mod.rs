@@ -17,6 +17,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::noise::NoiseModel;
+use crate::numerics::progress::checkpoint;
 pub use pooled::Pooled;
 
 /// Which deviation.
@@ -162,6 +163,7 @@ impl AllanCurve {
     pub fn refine(&mut self, model: &NoiseModel) {
         let (kind, samples, dt, windows) = (self.deviation, self.samples, self.dt, self.windows as f64);
         self.points.par_iter_mut().for_each(|point| {
+            checkpoint();
             let edf = windows * edf::degrees_of_freedom(kind, samples, point.m, dt, model);
             if !edf.is_nan() {
                 point.set_edf(edf);

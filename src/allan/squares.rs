@@ -9,6 +9,7 @@
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
+use crate::numerics::progress::checkpoint;
 use crate::numerics::reduce::Sum;
 
 /// Start points done together; three such stretches of phase fit the second-level cache of any processor of today.
@@ -36,7 +37,10 @@ fn of_differences<const P: usize>(x: &[f64], factors: &[usize]) -> Vec<f64> {
     let batch = |factors: &[usize]| {
         let mut parts = vec![0.0; x.len().div_ceil(WINDOW) * factors.len()];
         let windows = parts.par_chunks_mut(factors.len()).zip((0..x.len()).into_par_iter().step_by(WINDOW));
-        windows.for_each(|(sums, start)| arch.dispatch(Window::<P> { x, factors, start, sums }));
+        windows.for_each(|(sums, start)| {
+            checkpoint();
+            arch.dispatch(Window::<P> { x, factors, start, sums });
+        });
         let total = |i: usize| {
             let mut sum = Sum::default();
             parts.iter().skip(i).step_by(factors.len()).for_each(|part| sum.add(*part));

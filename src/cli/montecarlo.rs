@@ -13,7 +13,7 @@ use anyhow::{Context, bail};
 
 use super::files::{self, Kind};
 use super::flags::{whole, with_unit};
-use super::output::{digits, print_text, progress};
+use super::output::{digits, print_text, progress, with_bar};
 use super::{Status, Stop, VerdictFlags};
 use crate::cli::checked;
 use crate::export::{atomic, junit};
@@ -230,15 +230,15 @@ fn many_runs(args: &Args, experiment: &Experiment, course: &Course, stop: &Stop)
         let done = Runs { first: runs.start, end };
         document::partial_json(experiment, course, done, totals)
     };
-    let (totals, end) = course.sums_until(next..runs.end, start, &|count| bar.inc(count), &mut |totals, end| {
+    let mut pause = |totals: &[Totals], end: u64| {
         let stopping = stop.is_wanted();
         if let Some(path) = kept.filter(|_| stopping || saved.elapsed() > CHECKPOINT) {
             failure = atomic::write(path, partial(totals, end).as_bytes()).err();
             saved = Instant::now();
         }
         stopping || failure.is_some()
-    });
-    bar.finish_and_clear();
+    };
+    let (totals, end) = with_bar(bar, || course.sums_until(next..runs.end, start, &mut pause))?;
     if let Some(failure) = failure {
         return Err(failure.into());
     }
@@ -333,8 +333,7 @@ impl Outputs {
             replicates => {
                 let bar = progress((replicates * count).saturating_mul(course.axes.len() as u64), "false alarms");
                 let own = experiment.own_course()?;
-                let rate = calibration::false_alarms_of_experiments(&own, &gate, count, replicates, &|n| bar.inc(n));
-                bar.finish_and_clear();
+                let rate = with_bar(bar, || calibration::false_alarms_of_experiments(&own, &gate, count, replicates))?;
                 rate
             }
         });
@@ -342,12 +341,9 @@ impl Outputs {
             outcome.rejection = power::rejection(course, &gate, count);
             if let Some(rejection) = outcome.rejection.as_mut().filter(|_| self.confirm > 0) {
                 let bar = progress((self.confirm * count).saturating_mul(course.axes.len() as u64), "confirm");
-                let caught =
-                    calibration::caught_of_experiments(course, &gate.axes, gate.critical, count, self.confirm, &|n| {
-                        bar.inc(n)
-                    });
-                bar.finish_and_clear();
-                rejection.confirmed = Some(caught);
+                let (axes, critical) = (&gate.axes, gate.critical);
+                let caught = || calibration::caught_of_experiments(course, axes, critical, count, self.confirm);
+                rejection.confirmed = Some(with_bar(bar, caught)?);
             }
         }
         let detects = experiment.truth.is_none() || self.power;
@@ -404,8 +400,7 @@ impl Outputs {
             let sizes: usize =
                 outcome.detects.iter().map(|d| d.too_large.iter().count() + d.too_small.iter().count()).sum();
             let bar = progress((self.confirm * runs).saturating_mul(sizes as u64), "confirm");
-            power::confirm(experiment, course, gate, runs, self.confirm, &mut outcome.detects, &|n| bar.inc(n))?;
-            bar.finish_and_clear();
+            with_bar(bar, || power::confirm(experiment, course, gate, runs, self.confirm, &mut outcome.detects))??;
         }
         let mut text = String::new();
         for (number, what, size, wished) in plans {

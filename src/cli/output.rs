@@ -3,13 +3,14 @@
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::io::{ErrorKind, IsTerminal, Write};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use clap::CommandFactory;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use crate::export::atomic::in_words;
+use crate::numerics::progress::{Progress, Stopped, watched};
 use crate::params::{AxisParams, Params};
 use crate::replay::axes::RATE_TOLERANCE;
 pub use crate::units::digits;
@@ -120,6 +121,20 @@ pub fn progress(total: u64, what: &'static str) -> ProgressBar {
     }
     bar.set_message(what);
     bar
+}
+
+/// The work with a bar that is moved on by [`crate::numerics::progress::advance`].
+pub fn with_bar<T: Send>(bar: ProgressBar, work: impl FnOnce() -> T + Send) -> Result<T, Stopped> {
+    struct Bar(ProgressBar);
+    impl Progress for Bar {
+        fn advance(&self, parts: u64) {
+            self.0.inc(parts);
+        }
+    }
+    let watch: Arc<dyn Progress> = Arc::new(Bar(bar.clone()));
+    let done = watched(&watch, work);
+    bar.finish_and_clear();
+    done
 }
 
 /// "note: x, y: …" for what is said of each name, each sentence once.

@@ -25,7 +25,7 @@ use self::view::View;
 use super::files::{self, Kind};
 use super::flags::whole;
 use super::log_flags::LogFlags;
-use super::output::{print_json, print_text, progress, say};
+use super::output::{print_json, print_text, progress, say, with_bar};
 use super::{Status, VerdictFlags};
 use crate::cli::checked;
 use crate::consistency::Verdict;
@@ -133,8 +133,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let plan = Plan { runs: args.runs, seed: args.seed, ..Plan::quick(params.sample_rate_hz) };
     let insights = if args.insight { insight(&tuned, &options)? } else { Vec::new() };
     let bar = progress(plan.runs * tuned.design.axes.len() as u64, "verify");
-    let verification = verify(&tuned.design, &plan, &|runs| bar.inc(runs))?;
-    bar.finish_and_clear();
+    let verification = with_bar(bar, || verify(&tuned.design, &plan))??;
     if let Some(record) = tuned.design.tuning.as_object_mut() {
         let summary = json!({
             "verdict": verification.verdict, "alpha": verification.alpha, "runs": verification.runs.count(),

@@ -8,6 +8,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::model::LinearModel;
+use crate::numerics::progress::checkpoint;
 use bank::{BLOCK, Bank};
 use lane::LANES;
 use settled::Samples;
@@ -95,6 +96,7 @@ fn pass(models: &[LinearModel], log: &[Stretch<'_>], slope: bool, level: f64) ->
         bank.pause(part.missing);
         step += part.missing;
         for block in part.samples.chunks(BLOCK) {
+            checkpoint();
             data.iter_mut().zip(block).for_each(|(out, z)| *out = z - level);
             if slope {
                 ramp.iter_mut().zip(step..).for_each(|(t, k)| *t = (k as f64 - middle) * models[0].dt);

@@ -12,6 +12,7 @@ use super::gains::GainSequence;
 use super::judge::Judge;
 use crate::model::LinearModel;
 use crate::numerics::linalg::{cholesky, symmetrise};
+use crate::numerics::progress::checkpoint;
 
 pub use settled::{Settled, expect_settled};
 
@@ -257,6 +258,9 @@ impl Moments {
     }
 }
 
+/// A step takes less than a microsecond for each pair of states.
+const STEPS_BETWEEN_CHECKPOINTS: u64 = 1024;
+
 /// The whole run; `n` is the size of the joint state.
 #[inline(always)]
 fn run(
@@ -270,6 +274,9 @@ fn run(
     let mut gain = gains.gains.chunks_exact(gains.states).zip(&gains.weights);
     let mut wanted = gains.epochs.iter().peekable();
     for step in 0..gains.steps {
+        if step.is_multiple_of(STEPS_BETWEEN_CHECKPOINTS) {
+            checkpoint();
+        }
         let Moments { columns, measurements, scratch } = moments;
         if step > 0 {
             predict(n, joint, columns, &mut scratch.before);

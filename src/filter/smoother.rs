@@ -9,6 +9,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::kalman::Kalman;
 use crate::model::LinearModel;
+use crate::numerics::progress::checkpoint;
 
 /// What a filter was given, row by row: predictions with the input that was held, then the measurements that it accepted.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -85,6 +86,7 @@ pub fn smooth(model: &LinearModel, history: &History) -> Smoothed {
     let mut starts = Vec::new();
     for k in 0..rows {
         if k % stretch == 0 {
+            checkpoint();
             starts.push(filter.clone());
         }
         step(model, history, &mut filter, k, |_| ());
@@ -92,6 +94,7 @@ pub fn smooth(model: &LinearModel, history: &History) -> Smoothed {
     let mut adjoint = DVector::zeros(n);
     let mut information = DMatrix::zeros(n, n);
     for (i, mut filter) in starts.into_iter().enumerate().rev() {
+        checkpoint();
         let first = i * stretch;
         let epochs: Vec<Epoch> = (first..rows.min(first + stretch))
             .map(|k| {

@@ -19,6 +19,7 @@ use self::settled::{Bias, Run, Settled};
 use super::Kalman;
 use super::kalman::{predict_fixed, square, update_fixed};
 use crate::model::LinearModel;
+use crate::numerics::progress::checkpoint;
 
 /// Innovations of a log of the first measurement of `model`, one at every step; inputs are zero, other measurements are not taken.
 ///
@@ -40,6 +41,7 @@ pub fn innovations(model: &LinearModel, z: &[f64], innovation: &mut [f64], nis: 
         return log_likelihood;
     };
     for ((z, innovation), nis) in z.chunks(PIECE).zip(innovation.chunks_mut(PIECE)).zip(nis.chunks_mut(PIECE)) {
+        checkpoint();
         filter.run(z, innovation, nis);
         squares(innovation, nis);
     }

@@ -35,6 +35,7 @@ use sha2::{Digest, Sha256};
 use self::columns::Choice;
 use self::rows::{Batch, Part, Rows, WORTHWHILE};
 use self::table::{BLOCK, Table};
+use crate::numerics::progress::checkpoint;
 use crate::signal::check::{AxisRange, BackwardStamp, Checker, Finding, Outcome, TimeBase};
 use crate::signal::{Axis, Gap, LogCheck, Recording};
 use crate::units::{Dimension, Quantity, Unit, plain};
@@ -211,6 +212,7 @@ impl Log {
 
     /// Next wanted rows, stamps in seconds and values in SI; `None` at the end.
     fn next(&mut self, selection: &mut Selection, rows: &mut Rows) -> Result<Option<(Range<usize>, bool)>, InputError> {
+        checkpoint();
         if !self.table.next_rows(rows)? {
             return Ok(None);
         }

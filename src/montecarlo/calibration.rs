@@ -52,21 +52,15 @@ pub fn false_alarms(course: &Course, gate: &Gate, runs: u64) -> FalseAlarmRate {
     rate(course, gate, MEASURED, Method::Law, raw)
 }
 
-/// The same from whole experiments; `own` is the course whose truth is the design itself. `progress` counts runs of all axes.
-pub fn false_alarms_of_experiments(
-    own: &Course,
-    gate: &Gate,
-    runs: u64,
-    replicates: u64,
-    progress: &(dyn Fn(u64) + Sync),
-) -> FalseAlarmRate {
-    rate(own, gate, replicates, Method::Experiments, |replicate| whole_experiment(own, runs, replicate, progress))
+/// The same from whole experiments; `own` is the course whose truth is the design itself.
+pub fn false_alarms_of_experiments(own: &Course, gate: &Gate, runs: u64, replicates: u64) -> FalseAlarmRate {
+    rate(own, gate, replicates, Method::Experiments, |replicate| whole_experiment(own, runs, replicate))
 }
 
 /// Raw p-values of whole experiment number `number`, per axis; experiments share no runs.
-fn whole_experiment(course: &Course, runs: u64, number: u64, progress: &(dyn Fn(u64) + Sync)) -> Vec<Vec<f64>> {
+fn whole_experiment(course: &Course, runs: u64, number: u64) -> Vec<Vec<f64>> {
     let first = MAX_RUN + number * runs.next_multiple_of(4);
-    let totals = course.sums(first..first + runs, progress);
+    let totals = course.sums(first..first + runs);
     course.axes.iter().zip(&totals).map(|(axis, totals)| conclusion::raw_p_values(axis, totals, runs)).collect()
 }
 
@@ -77,10 +71,9 @@ pub fn caught_of_experiments(
     critical: f64,
     runs: u64,
     experiments: u64,
-    progress: &(dyn Fn(u64) + Sync),
 ) -> Caught {
     let failed = |experiment: &u64| {
-        let raw = whole_experiment(course, runs, *experiment, progress);
+        let raw = whole_experiment(course, runs, *experiment);
         let mut axes = raw.iter().zip(gates);
         axes.any(|(raw, gate)| gate.p_values(raw).into_iter().any(|p| rejected(p, critical)))
     };

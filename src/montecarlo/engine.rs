@@ -1,5 +1,6 @@
 //! Runs by number, on all threads.
 
+use crate::numerics::progress::{advance, checkpoint};
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -35,11 +36,11 @@ impl Course {
         Course { axes, steps, seed, dt, nominal, spreads }
     }
 
-    /// Sums over `runs`, one per axis. `progress` is called with the number of runs just finished (all axes).
+    /// Sums over `runs`, one per axis. Who waits hears of each run of each axis.
     ///
     /// Every random number is addressed by (seed, run, axis, source) and the sums are exact: any number of threads, any cut into ranges
     /// gives the same.
-    pub fn sums(&self, runs: Range<u64>, progress: &(dyn Fn(u64) + Sync)) -> Vec<Totals> {
+    pub fn sums(&self, runs: Range<u64>) -> Vec<Totals> {
         let groups = (runs.end - runs.start).div_ceil(LANES as u64);
         let zero = || self.axes.iter().map(|axis| Totals::new(&axis.layout)).collect::<Vec<_>>();
         (0..groups * self.axes.len() as u64)
@@ -48,7 +49,7 @@ impl Course {
                 || (zero(), self.axes.iter().map(|_| None).collect::<Vec<Option<Scratch>>>()),
                 |(mut totals, mut scratch), item| {
                     let (axis, first) = ((item / groups) as usize, runs.start + item % groups * LANES as u64);
-                    self.group(axis as u32, first, &runs, &mut totals[axis], &mut scratch[axis], progress);
+                    self.group(axis as u32, first, &runs, &mut totals[axis], &mut scratch[axis]);
                     (totals, scratch)
                 },
             )
@@ -60,15 +61,7 @@ impl Course {
     }
 
     /// Up to eight runs of one axis.
-    fn group(
-        &self,
-        number: u32,
-        first: u64,
-        runs: &Range<u64>,
-        totals: &mut Totals,
-        scratch: &mut Option<Scratch>,
-        progress: &(dyn Fn(u64) + Sync),
-    ) {
+    fn group(&self, number: u32, first: u64, runs: &Range<u64>, totals: &mut Totals, scratch: &mut Option<Scratch>) {
         let scratch = scratch.get_or_insert_with(|| Scratch::new(&self.axes[number as usize]));
         let eight = self.from(number, first, scratch);
         simulate(&self.axes[number as usize], eight, scratch, None);
@@ -76,7 +69,7 @@ impl Course {
         for (values, counts) in scratch.values.iter().zip(&scratch.counts).take(used as usize) {
             totals.add(values, counts);
         }
-        progress(used);
+        advance(used);
     }
 
     /// `first` and the seven runs after it, of one axis, at their start.
@@ -104,7 +97,6 @@ impl Course {
         &self,
         runs: Range<u64>,
         start: Option<Vec<Totals>>,
-        progress: &(dyn Fn(u64) + Sync),
         pause: &mut dyn FnMut(&[Totals], u64) -> bool,
     ) -> (Vec<Totals>, u64) {
         let per_run = self.steps * self.axes.len() as u64;
@@ -113,7 +105,7 @@ impl Course {
         let mut next = runs.start;
         while next < runs.end {
             let end = next.saturating_add(batch).min(runs.end);
-            let fresh = self.sums(next..end, progress);
+            let fresh = self.sums(next..end);
             totals.iter_mut().zip(&fresh).for_each(|(total, fresh)| total.merge(fresh));
             next = end;
             if next < runs.end && pause(&totals, next) {
@@ -230,6 +222,7 @@ fn simulate(axis: &AxisCourse, mut runs: Runs, scratch: &mut Scratch, mut observ
     let mut step = 0;
     let mut epochs = axis.epochs.iter().enumerate().peekable();
     while step < axis.gains.steps {
+        checkpoint();
         runs.draw(scratch);
         let end = (step + CHUNK as u64).min(axis.gains.steps);
         while step < end {

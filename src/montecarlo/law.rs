@@ -19,6 +19,7 @@ use super::course::AxisCourse;
 use super::gate::{Kind, Raw};
 use super::sums::Channel;
 use crate::numerics::distribution::normal_sf;
+use crate::numerics::progress::checkpoint;
 use crate::numerics::random::{StreamId, fill_normal, normal, stream};
 
 /// Term part of the stream addresses of replicates.
@@ -174,6 +175,7 @@ impl Law {
 
     /// Raw p-values of replicate number `replicate`, in the order of [`Kind::of`].
     pub(super) fn draw(&self, raw: &Raw<'_>, seed: u64, replicate: u64, axis: u32) -> Vec<f64> {
+        checkpoint();
         let mut rng = stream(seed, StreamId { run: replicate, axis, term: REPLICATE });
         let drawn = self.chain(&mut rng);
         let channels: Vec<[f64; 6]> = self.channels.iter().map(|c| c.draw(raw, self.runs, &mut rng)).collect();

@@ -91,19 +91,14 @@ pub enum MonteCarloError {
 /// Runs the design on its own model: is its covariance what its errors are?
 ///
 /// The tests are those of the gate ([`gate::Kind`]); the family-wise false-alarm probability is `plan.alpha`.
-/// `progress` is called with the number of runs just finished (all axes). Same design, plan and version: same outcome for any number of threads.
-pub fn verify(design: &FilterDesign, plan: &Plan, progress: &(dyn Fn(u64) + Sync)) -> Result<Outcome, MonteCarloError> {
-    verify_against(design, design, plan, progress)
+/// Who waits hears of each run of each axis. Same design, plan and version: same outcome for any number of threads.
+pub fn verify(design: &FilterDesign, plan: &Plan) -> Result<Outcome, MonteCarloError> {
+    verify_against(design, design, plan)
 }
 
 /// The same with another truth: `truth` must have the axes and sample rate of `design`; with other states than the filter's, the error
 /// that is judged is that of the whole drift.
-pub fn verify_against(
-    design: &FilterDesign,
-    truth: &FilterDesign,
-    plan: &Plan,
-    progress: &(dyn Fn(u64) + Sync),
-) -> Result<Outcome, MonteCarloError> {
+pub fn verify_against(design: &FilterDesign, truth: &FilterDesign, plan: &Plan) -> Result<Outcome, MonteCarloError> {
     experiment::check(plan.steps, plan.alpha)?;
     if plan.runs < 2 {
         return Err(MonteCarloError::Plan { name: "runs", value: plan.runs as f64, expected: "at least 2".into() });
@@ -118,7 +113,7 @@ pub fn verify_against(
         return Err(MonteCarloError::Mismatch { axis, truth: rate(truth), filter: rate(design) });
     }
     let course = experiment::course_of(design, course::own_models(truth), plan.steps, plan.seed)?;
-    let totals = course.sums(0..plan.runs, progress);
+    let totals = course.sums(0..plan.runs);
     let gate = calibration::gate(&course, plan.runs, plan.alpha, QUICK_REPLICATES);
     Ok(conclude(&course, &totals, 0..plan.runs, &gate))
 }

@@ -313,7 +313,6 @@ pub fn confirm(
     runs: u64,
     experiments: u64,
     found: &mut [Detectable],
-    progress: &(dyn Fn(u64) + Sync),
 ) -> Result<(), MonteCarloError> {
     for number in 0..own.axes.len() {
         let axis = &own.axes[number];
@@ -324,14 +323,8 @@ pub fn confirm(
                 let truth = what.truth(experiment, number, sighting.size)?;
                 let course = AxisCourse::new(&experiment.design.axes[number], truth, own.steps)?;
                 let course = Course::new(vec![course], vec![None], own.steps, own.seed, own.dt);
-                let caught = caught_of_experiments(
-                    &course,
-                    &gate.axes[number..=number],
-                    gate.critical,
-                    runs,
-                    experiments,
-                    progress,
-                );
+                let caught =
+                    caught_of_experiments(&course, &gate.axes[number..=number], gate.critical, runs, experiments);
                 sighting.confirmed = Some(caught);
             }
         }

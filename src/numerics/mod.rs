@@ -6,6 +6,7 @@ pub mod largest_normal;
 pub mod linalg;
 pub mod normals;
 pub mod optimize;
+pub mod progress;
 pub mod quadratic_form;
 pub mod random;
 pub mod reduce;

@@ -1,5 +1,6 @@
 //! Roots, minima and second differences: the only searches of the house.
 
+use super::progress::checkpoint;
 use std::cell::{Cell, RefCell};
 
 use nalgebra::DMatrix;
@@ -19,7 +20,10 @@ pub fn bracketed_root<V: Into<Option<f64>>>(
     high: f64,
     tolerance: f64,
 ) -> Option<f64> {
-    let mut value = |x: f64| f(x).into().filter(|v| !v.is_nan());
+    let mut value = |x: f64| {
+        checkpoint();
+        f(x).into().filter(|v| !v.is_nan())
+    };
     // b is the best point, a the one before it, and the root is between b and c
     let (mut a, mut b) = (low, high);
     let (mut f_a, mut f_b) = (value(a)?, value(b)?);
@@ -209,6 +213,7 @@ pub fn minimize(problem: &Problem<'_>, start: &[f64], bounds: &[(f64, f64)]) -> 
         let of = |which: usize, x: &[f64], slopes: Option<&mut [f64]>| {
             let mut last = last.borrow_mut();
             if last.0 != x || (slopes.is_some() && last.1.slopes.is_empty()) {
+                checkpoint();
                 *last = (x.to_vec(), (problem.look)(&whole(x), &scale, slopes.is_some()));
                 looks.set(looks.get() + 1);
             }

@@ -24,6 +24,7 @@ use crate::filter::{AxisDesign, FilterDesign, Form, Running};
 use crate::input::Block;
 use crate::model::{LinearModel, Named};
 use crate::numerics::linalg::LinalgError;
+use crate::numerics::progress::checkpoint;
 use crate::params::PlantEntry;
 use crate::units::Quantity;
 
@@ -383,6 +384,7 @@ impl Replayer {
 
     /// The next block of the log; its estimates replace what is in `estimates`, if wanted.
     pub fn push(&mut self, block: &Block, estimates: Option<&mut Estimates>) {
+        checkpoint();
         let values_of = |column: usize| block.values.get(column).map_or(&[][..], Vec::as_slice);
         let mut done = vec![false; self.axes.len()];
         if estimates.is_none() {

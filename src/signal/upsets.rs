@@ -2,6 +2,7 @@
 
 use super::check::robust;
 use crate::numerics::distribution::normal_quantile;
+use crate::numerics::progress::checkpoint;
 
 /// Chance of calling anything in a log of normal noise an outlier, and likewise a step.
 pub const FALSE_ALARM: f64 = 1e-3;
@@ -59,6 +60,7 @@ fn outliers_about(x: &[f64], level_samples: usize) -> Vec<usize> {
     let reach = REACH * level_samples;
     let mut found = Vec::new();
     for (first, part) in x.chunks(reach).enumerate().map(|(i, part)| (i * reach, part)) {
+        checkpoint();
         let residuals: Vec<f64> = part
             .chunks(level_samples)
             .flat_map(|own| {

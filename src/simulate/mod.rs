@@ -25,6 +25,7 @@
 mod flight;
 
 use crate::noise::{Kind, SamplePath};
+use crate::numerics::progress::checkpoint;
 use crate::numerics::random::{StreamId, normal, stream};
 use crate::params::{AxisParams, Params};
 
@@ -179,6 +180,7 @@ impl Simulator {
 
     /// Next at most `n` samples per axis; 0 at the end.
     pub fn next_block(&mut self, n: usize, axes: &mut Vec<AxisBlock>) -> usize {
+        checkpoint();
         let left = self.scenario.samples - self.next;
         let n = usize::try_from(left).map_or(n, |left| left.min(n));
         axes.resize_with(self.axes.len(), AxisBlock::default);

@@ -26,7 +26,7 @@ fn the_gate_finds_the_angle_filter_consistent_and_its_bias_sigma_true() {
         let tuned = tuned(design);
         let plan = Plan { runs: 100, alpha: 1e-5, ..Plan::quick(100.0) };
         assert_eq!(plan.steps, 60_000);
-        let outcome = verify(&tuned.design, &plan, &|_| ()).unwrap();
+        let outcome = verify(&tuned.design, &plan).unwrap();
         assert_eq!(outcome.verdict, Verdict::Consistent, "{}", outcome.meaning);
         let axis = &outcome.axes[0];
         let names: Vec<&str> = axis.errors.iter().map(|error| error.name.as_str()).collect();

@@ -78,7 +78,7 @@ fn innovations_are_white_with_the_line_in_the_filter() {
 fn montecarlo_finds_the_design_consistent() {
     let tuned = tuned(&vibrating());
     let plan = Plan { runs: 60, steps: 10_000, seed: 3, alpha: 1e-5 };
-    let outcome = verify(&tuned.design, &plan, &|_| ()).unwrap();
+    let outcome = verify(&tuned.design, &plan).unwrap();
     assert_eq!(outcome.verdict, Verdict::Consistent, "{:#?}", outcome.tests);
 }
 

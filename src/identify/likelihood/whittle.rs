@@ -13,6 +13,7 @@ use super::form::{Form, Piece};
 use super::ordinates::Ordinates;
 use crate::noise::{Kind, Term};
 use crate::numerics::optimize::{Look, Optimum, Problem, minimize};
+use crate::numerics::progress::checkpoint;
 
 /// The correlation time of a line is at least this many samples.
 const SHORTEST: f64 = 0.3;
@@ -199,6 +200,7 @@ fn slope(data: &Ordinates, form: &Form, total: &[f64]) -> (f64, f64) {
 
 /// −ln L, and its gradient.
 fn objective(data: &Ordinates, form: &Form, logs: &[f64], held: &Held, gradient: Option<&mut [f64]>) -> f64 {
+    checkpoint();
     objective_of(data, form, &spectrum(data, form, logs, held, gradient.is_some()), gradient)
 }
 

@@ -1,8 +1,10 @@
 //! The crate `parquet` panics on some damaged pages. Here such a panic is an answer, and prints nothing.
 
 use std::cell::Cell;
-use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind, set_hook, take_hook};
 use std::sync::Once;
+
+use crate::numerics::progress::is_stop;
 
 thread_local! {
     static GUARDED: Cell<bool> = const { Cell::new(false) };
@@ -22,5 +24,8 @@ pub(super) fn guarded<T>(work: impl FnOnce() -> T) -> Option<T> {
     GUARDED.set(true);
     let done = catch_unwind(AssertUnwindSafe(work));
     GUARDED.set(false);
-    done.ok()
+    match done {
+        Err(why) if is_stop(&*why) => resume_unwind(why),
+        done => done.ok(),
+    }
 }

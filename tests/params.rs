@@ -335,10 +335,18 @@ pub fn accepts(schema: &Value, root: &Value, value: &Value) -> Result<(), String
             "minItems" => value.as_array().is_none_or(|a| a.len() as u64 >= rule.as_u64().unwrap()),
             "maxItems" => value.as_array().is_none_or(|a| a.len() as u64 <= rule.as_u64().unwrap()),
             "required" => rule.as_array().unwrap().iter().all(|k| value.get(k.as_str().unwrap()).is_some()),
-            "items" => value.as_array().is_none_or(|a| a.iter().all(|v| accepts(rule, root, v).is_ok())),
-            "properties" => value.as_object().is_none_or(|map| {
-                map.iter().all(|(k, v)| rule.get(k).is_none_or(|rule| accepts(rule, root, v).is_ok()))
-            }),
+            "items" => {
+                value.as_array().into_iter().flatten().try_for_each(|item| accepts(rule, root, item))?;
+                true
+            }
+            "properties" => {
+                let inner = |(key, value): (&String, &Value)| match rule.get(key) {
+                    Some(rule) => accepts(rule, root, value).map_err(|why| format!("{key}: {why}")),
+                    None => Ok(()),
+                };
+                value.as_object().into_iter().flatten().try_for_each(inner)?;
+                true
+            }
             "additionalProperties" => value
                 .as_object()
                 .is_none_or(|map| rule == true || map.keys().all(|k| schema["properties"].get(k).is_some())),

@@ -77,24 +77,33 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         Document::Params => Params::schema(),
         Document::Filter => FilterDesign::schema(),
         Document::Attitude => AttitudeDesign::schema(),
-        Document::AttitudeReplay => schemars::schema_for!(AttitudeReplay).to_value(),
+        Document::AttitudeReplay => printed::<AttitudeReplay>(),
         Document::Airplane => AirplaneDocument::schema(),
-        Document::Linear => schemars::schema_for!(LinearDocument).to_value(),
-        Document::AirplaneCheck => schemars::schema_for!(AirplaneCheck).to_value(),
+        Document::Linear => printed::<LinearDocument>(),
+        Document::AirplaneCheck => printed::<AirplaneCheck>(),
         Document::Flight => FlightDocument::schema(),
-        Document::Fly => schemars::schema_for!(FlightReport).to_value(),
+        Document::Fly => printed::<FlightReport>(),
         Document::Montecarlo => montecarlo::document::schema(),
-        Document::Compare => schemars::schema_for!(Comparison).to_value(),
-        Document::Inflate => schemars::schema_for!(Inflation).to_value(),
-        Document::Info => schemars::schema_for!(Inventory).to_value(),
-        Document::Allan => schemars::schema_for!(allan::Document).to_value(),
-        Document::Identify => schemars::schema_for!(identify::Document<'_>).to_value(),
-        Document::Plan => schemars::schema_for!(plan::Document<'_>).to_value(),
-        Document::Simulation => schemars::schema_for!(simulate::Summary).to_value(),
-        Document::Tune => schemars::schema_for!(tune::Printed<'_>).to_value(),
-        Document::TuneAttitude => schemars::schema_for!(tune::attitude::Printed<'_>).to_value(),
-        Document::Ranking => schemars::schema_for!(Ranking).to_value(),
-        Document::Replay => schemars::schema_for!(ReplayResult).to_value(),
+        Document::Compare => printed::<Comparison>(),
+        Document::Inflate => printed::<Inflation>(),
+        Document::Info => printed::<Inventory>(),
+        Document::Allan => printed::<allan::Document>(),
+        Document::Identify => printed::<identify::Document<'_>>(),
+        Document::Plan => printed::<plan::Document<'_>>(),
+        Document::Simulation => printed::<simulate::Summary>(),
+        Document::Tune => printed::<tune::Printed<'_>>(),
+        Document::TuneAttitude => printed::<tune::attitude::Printed<'_>>(),
+        Document::Ranking => printed::<Ranking>(),
+        Document::Replay => printed::<ReplayResult>(),
     })?;
     Ok(Status::Done)
+}
+
+/// The schema of a document that is only written: what it leaves out when there is none is not required.
+fn printed<T: schemars::JsonSchema>() -> serde_json::Value {
+    schemars::generate::SchemaSettings::draft2020_12()
+        .for_serialize()
+        .into_generator()
+        .into_root_schema_for::<T>()
+        .to_value()
 }

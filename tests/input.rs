@@ -247,7 +247,7 @@ fn increments_and_angles_have_their_own_dimension() {
         assert_eq!(log.quantity, Quantity::AngularRate);
     }
     let refusal = refused("t_s,gyro_x (deg/s)\n0,1\n1,2\n", &[("input", "angle")]);
-    assert!(refusal.contains("'gyro_x (deg/s)'") && refusal.contains("without --input"), "{refusal}");
+    assert!(refusal.contains("'gyro_x (deg/s)'") && refusal.contains("without `input`"), "{refusal}");
 }
 
 /// Every refusal names the file, the place, and what to do.
@@ -255,22 +255,22 @@ fn increments_and_angles_have_their_own_dimension() {
 fn what_is_ambiguous_or_missing_is_refused_in_one_line() {
     let both = "t_s,gyr_x_dps,gyr_y_dps\n0,1,2\n1,2,3\n";
     let table: [(&str, Flags, &[&str]); 23] = [
-        ("t_s,gx\n0,1\n1,2\n", &[], &["line 1", "no unit for column 'gx'", "--unit"]),
-        ("t_s,gx (furlongs)\n0,1\n1,2\n", &[], &["furlongs", "--unit"]),
-        ("t_s,gyro_x (deg)\n0,1\n1,2\n", &[], &["'gyro_x (deg)'", "an angle", "expected", "--input"]),
-        (both, &[("unit", "rad/s")], &["'gyr_x_dps'", "deg/s by its header", "--unit says rad/s"]),
+        ("t_s,gx\n0,1\n1,2\n", &[], &["line 1", "no unit for column 'gx'", "`unit`"]),
+        ("t_s,gx (furlongs)\n0,1\n1,2\n", &[], &["furlongs", "`unit`"]),
+        ("t_s,gyro_x (deg)\n0,1\n1,2\n", &[], &["'gyro_x (deg)'", "an angle", "expected", "`input`"]),
+        (both, &[("unit", "rad/s")], &["'gyr_x_dps'", "deg/s by its header", "`unit` says rad/s"]),
         (both, &[("columns", "gyr_z")], &["no column 'gyr_z'", "1 't_s', 2 'gyr_x_dps', 3 'gyr_y_dps'"]),
         (both, &[("columns", "7")], &["no column '7'"]),
         (both, &[("columns", "2,gyr_x")], &["asked for twice"]),
-        (both, &[("columns", "t_s,2"), ("unit", "deg/s")], &["'t_s'", "--unit says deg/s"]),
-        ("time,gx_dps\n0,1\n1,2\n", &[], &["time column 'time' has no unit", "--time 'time:s'", "--rate"]),
-        ("time (ms),gx_dps\n0,1\n1,2\n", &[("time", "time:s")], &["ms by its header", "--time says s"]),
+        (both, &[("columns", "t_s,2"), ("unit", "deg/s")], &["'t_s'", "`unit` says deg/s"]),
+        ("time,gx_dps\n0,1\n1,2\n", &[], &["time column 'time' has no unit", "`time` 'time:s'", "`rate`"]),
+        ("time (ms),gx_dps\n0,1\n1,2\n", &[("time", "time:s")], &["ms by its header", "`time` says s"]),
         ("time (degC),gx_dps\n0,1\n1,2\n", &[("time", "time")], &["'time (degC)'", "expected a time"]),
-        ("gx_dps\n1\n2\n", &[], &["no sample rate", "--rate"]),
+        ("gx_dps\n1\n2\n", &[], &["no sample rate", "`rate`"]),
         (both, &[("time", "none")], &["no sample rate"]),
-        (both, &[("rate", "0")], &["--rate must be a positive number"]),
-        (both, &[("start", "5"), ("end", "4")], &["--start must be before --end"]),
-        (both, &[("start", "50")], &["no sample lies between --start and --end"]),
+        (both, &[("rate", "0")], &["`rate` must be a positive number"]),
+        (both, &[("start", "5"), ("end", "4")], &["`start` must be before `end`"]),
+        (both, &[("start", "50")], &["no sample lies between `start` and `end`"]),
         ("t1 (s),time2 (s),gx_dps\n0,0,1\n1,1,2\n", &[("time", "t3")], &["no column 't3'"]),
         (
             "time (s),timestamp (us),gx_dps\n0,0,1\n1,1,2\n",
@@ -280,10 +280,10 @@ fn what_is_ambiguous_or_missing_is_refused_in_one_line() {
         (
             "t_s,gyro1_x_dps,gyro2_x_dps\n0,1,2\n1,2,3\n",
             &[],
-            &["more than one sensor", "'gyro1_x_dps', 'gyro2_x_dps'", "--columns"],
+            &["more than one sensor", "'gyro1_x_dps', 'gyro2_x_dps'", "`columns`"],
         ),
         ("t_s,pressure (hPa)\n0,1\n1,2\n", &[], &["no gyro or accelerometer column", "2 'pressure (hPa)'"]),
-        ("1,2,3\n2,3,4\n", &[("rate", "1"), ("unit", "deg/s")], &["no header", "--columns"]),
+        ("1,2,3\n2,3,4\n", &[("rate", "1"), ("unit", "deg/s")], &["no header", "`columns`"]),
         ("x_dps,x_dps\n1,2\n2,3\n", &[("columns", "x_dps"), ("rate", "1")], &["columns 1 and 2 are both named"]),
         ("t_s,gx_dps\n,1\n1,2\n2,2\n", &[], &["line 2", "'t_s'", "the time stamp is empty"]),
     ];
@@ -316,7 +316,7 @@ fn start_and_end_are_seconds_from_the_first_row() {
     // time that goes back is harmless beyond the end
     let broken = format!("t_s,gx_dps\n{rows}0,0\n");
     let message = refused(&broken, &[]);
-    assert!(message.contains("line 102") && message.contains("--end"), "{message}");
+    assert!(message.contains("line 102") && message.contains("`end`"), "{message}");
     assert_eq!(read(&broken, &[("end", "9.85")]).unwrap().1.samples, 99);
     assert_eq!(read(&broken, &[("rate", "10")]).unwrap().1.samples, 101);
 }

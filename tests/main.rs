@@ -28,6 +28,7 @@ mod noise;
 mod numerics;
 mod params;
 mod plants;
+mod progress;
 mod replay;
 mod report;
 mod shell;

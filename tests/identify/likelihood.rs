@@ -266,11 +266,11 @@ fn what_says_nothing_is_refused() {
     assert_eq!(said(&[1.0; 29]), "x: 29 samples are too few to identify noise: at least 30 are needed");
     let mut hole = log(&[white(1.0)], 100, 0.01, 1, 0);
     hole[40] = f64::NAN;
-    assert_eq!(said(&hole), "x: sample 40 is not finite: cut the log with --start/--end");
+    assert_eq!(said(&hole), "x: sample 40 is not finite: cut the log with `start`/`end`");
     // a peak of four standard deviations is in some hundred samples, not in all
     let line = parse_model("white+osc").unwrap();
     let quiet = (1..20).find_map(|seed| attempt(&log(&[white(1.0)], 100, 0.01, seed, 0), 0.01, &line).err()).unwrap();
-    assert_eq!(quiet.to_string(), "x: no line stands out of the spectrum: leave osc out of --model");
+    assert_eq!(quiet.to_string(), "x: no line stands out of the spectrum: leave osc out of `model`");
 }
 
 /// A Gauss-Markov process that forgets within a sample or two: the log sets no lower limit to its time, and the filter needs it all the same. The variance

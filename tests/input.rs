@@ -29,7 +29,7 @@ mod vendors;
 
 use kfdesign::export::table::TableWriter;
 use kfdesign::input::{self, Block, InputKind, LogOptions, LogReader};
-use kfdesign::signal::check::TimeBase;
+use kfdesign::signal::check::{FindingKind, TimeBase};
 use kfdesign::signal::{Gap, LogCheck, Recording};
 use kfdesign::units::{Quantity, Unit};
 use proptest::prelude::*;
@@ -301,7 +301,7 @@ fn empty_fields_are_nan_and_counted() {
     let text = "t_s,gx_dps\n0,1\n1,\n2,nan\n3,N/A\n4,inf\n5,2\n";
     let (log, check) = read(text, &[]).unwrap();
     assert_close(&shown(&log, 0), &[1.0, f64::NAN, f64::NAN, f64::NAN, f64::NAN, 2.0], "");
-    let nan = check.findings.iter().find(|f| f.kind == "nan").unwrap();
+    let nan = check.findings.iter().find(|f| f.kind == FindingKind::Nan).unwrap();
     assert_eq!((nan.count, nan.first_index, nan.first_s), (4, 1, 1.0));
 }
 

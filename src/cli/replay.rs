@@ -3,6 +3,7 @@
 mod attitude;
 mod sight;
 
+use crate::signal::check::FindingKind;
 use std::path::PathBuf;
 
 use anyhow::Context;
@@ -136,7 +137,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     result.log = Some(name);
     result.log_sha256 = Some(reader.sha256().to_string());
     say_rates(&design, &result);
-    if design.plant == "static" && check.findings.iter().all(|finding| finding.kind != "motion") {
+    if design.plant == "static" && check.findings.iter().all(|finding| finding.kind != FindingKind::Motion) {
         say_follow(args, &result);
     }
     let unit = reader.axes().first().map(|a| a.unit.clone());

@@ -24,7 +24,7 @@ use crate::allan::{AllanCurve, AllanPoint};
 use crate::consistency::effect::{PERIODOGRAM_TOLERANCE, VARIANCE_RATIO_TOLERANCE};
 use crate::filter::likelihood::Stretch;
 use crate::noise::{Kind, NoiseModel, Term};
-use crate::params::{AxisParams, Check, Measured, NotIdentified, TermEntry};
+use crate::params::{AxisParams, Check, CheckKind, Measured, NotIdentified, TermEntry};
 use crate::units::{Unit, digits};
 pub use likelihood::shared::{SharedTime, TimeProfile, shared_time};
 pub use likelihood::sums::{Sum, Sums, counts_as_white};
@@ -177,7 +177,7 @@ impl Identified {
         };
         // not so of a p-value that is not a number: the graphical recipe has none
         (self.fit_p_value < SURELY_MISSED && effect > tolerated).then(|| Check {
-            kind: Check::FIT.into(),
+            kind: CheckKind::Fit,
             axis: Some(self.params.name.clone()),
             message: format!(
                 "{}: the model does not explain the log: {words}, tolerated {} (p = {})",

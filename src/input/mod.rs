@@ -36,7 +36,7 @@ use self::columns::Choice;
 use self::rows::{Batch, Part, Rows, WORTHWHILE};
 use self::table::{BLOCK, Table};
 use crate::numerics::progress::checkpoint;
-use crate::signal::check::{AxisRange, BackwardStamp, Checker, Finding, Outcome, TimeBase};
+use crate::signal::check::{AxisRange, BackwardStamp, Checker, Finding, FindingKind, Outcome, TimeBase};
 use crate::signal::{Axis, Gap, LogCheck, Recording};
 use crate::units::{Dimension, Quantity, Unit, plain};
 
@@ -192,13 +192,13 @@ impl Log {
         let (named, place, rate) = (table.named(), table.place(), table.rate());
         let rate_hz = rate.as_ref().map(|(_, rate)| *rate);
         let choice = columns::Table { heads: &table.heads(), named, place: &place, rate_hz }.choose(options)?;
-        let mut notes: Vec<Finding> = note.map(|note| Finding::note("topic", note)).into_iter().collect();
+        let mut notes: Vec<Finding> = note.map(|note| Finding::note(FindingKind::Topic, note)).into_iter().collect();
         let mut options = options.clone();
         if choice.time.is_none()
             && let (None, Some((name, rate))) = (options.rate_hz, rate)
         {
             options.rate_hz = Some(rate);
-            notes.push(Finding::note("rate", format!("{rate} Hz by '{name}' of the file")));
+            notes.push(Finding::note(FindingKind::Rate, format!("{rate} Hz by '{name}' of the file")));
         }
         let beside = choice.temperature.column.as_ref().map(|(column, _)| *column);
         table.select(choice.time.as_ref().map(|(column, _)| *column), &choice.columns, beside);
@@ -325,7 +325,7 @@ impl Log {
             self.enough(checker.rows(), &selection)?;
             match checker.finish() {
                 Outcome::Done { mut check, gaps, axes } => {
-                    let damage = self.table.notes().into_iter().map(|note| Finding::note("damaged", note));
+                    let damage = self.table.notes().into_iter().map(|note| Finding::note(FindingKind::Damaged, note));
                     let damage = damage.map(|note| Finding { serious: true, ..note });
                     check.findings.splice(0..0, self.notes.iter().cloned().chain(damage));
                     self.usable(&axes, &check)?;
@@ -369,7 +369,8 @@ impl Log {
     fn usable(&self, axes: &[AxisRange], check: &LogCheck) -> Result<(), InputError> {
         for (axis, info) in axes.iter().zip(&self.choice.axes) {
             if axis.usable == 0 {
-                let of_it = |found: &&Finding| found.kind == "overflow" && found.axis.as_ref() == Some(&axis.name);
+                let of_it =
+                    |found: &&Finding| found.kind == FindingKind::Overflow && found.axis.as_ref() == Some(&axis.name);
                 let why = check.findings.iter().find(of_it).map(|found| format!(": {}", found.message));
                 let (name, rows) = (&axis.name, check.samples);
                 return self.fail(format!("column '{name}' holds no number in {rows} rows{}", why.unwrap_or_default()));

@@ -3,7 +3,7 @@
 use super::columns::{Table, Temperature, same};
 use super::names::{is_of, is_temperature, words};
 use super::{AxisInfo, InputError, LogOptions};
-use crate::signal::check::Finding;
+use crate::signal::check::{Finding, FindingKind};
 use crate::units::{Dimension, Quantity};
 
 /// Which column is the temperature.
@@ -122,7 +122,7 @@ pub(super) fn usable(
     values: Option<Vec<f64>>,
     options: &LogOptions,
 ) -> Result<(Option<Read>, Option<Finding>), String> {
-    let note = |message: String| Finding::note("temperature", message);
+    let note = |message: String| Finding::note(FindingKind::Temperature, message);
     match (found.column, values) {
         (Some((_, info)), Some(values)) if !values.iter().any(|v| v.is_finite()) => {
             let message = format!("temperature column '{}' holds no number in {} rows", info.name, values.len());

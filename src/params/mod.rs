@@ -90,12 +90,23 @@ pub struct Inflated {
     pub interval: [f64; 2],
 }
 
+/// What a check is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum CheckKind {
+    /// The log is not at rest all the time.
+    Motion,
+    /// The model misses the spectrum of the log.
+    Fit,
+    /// The part to identify instead.
+    Calm,
+}
+
 /// A check that the log, or the fit to it, has failed; or (`calm`) what part of such a log is at rest.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Check {
-    /// "motion": the log is not at rest all the time; "fit": the model misses the spectrum of the log; "calm": the part to identify instead.
-    pub kind: String,
+    pub kind: CheckKind,
     /// None: the log as a whole.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axis: Option<String>,
@@ -104,12 +115,6 @@ pub struct Check {
     /// The numbers behind it, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub numbers: BTreeMap<String, f64>,
-}
-
-impl Check {
-    pub const MOTION: &str = "motion";
-    pub const FIT: &str = "fit";
-    pub const CALM: &str = "calm";
 }
 
 /// A parameter that is not the same in all logs from which the document is: its value and interval are those of the mean over logs.
@@ -149,7 +154,7 @@ pub struct Source {
 impl Source {
     /// The log, or the fit to it, has failed a check: one line that names each with its axes, and the part that is at rest.
     pub fn failed(&self) -> Option<String> {
-        let of = |kind: &str, words: &str| {
+        let of = |kind: CheckKind, words: &str| {
             let found = self.checks.iter().filter(|check| check.kind == kind);
             let mut axes: Vec<&str> = found.clone().filter_map(|check| check.axis.as_deref()).collect();
             axes.dedup();
@@ -157,13 +162,13 @@ impl Source {
             found.take(1).map(|_| format!("{words}{on}")).next()
         };
         let failed: Vec<String> = [
-            of(Check::MOTION, "the log is not at rest all the time"),
-            of(Check::FIT, "the model misses the spectrum of the log"),
+            of(CheckKind::Motion, "the log is not at rest all the time"),
+            of(CheckKind::Fit, "the model misses the spectrum of the log"),
         ]
         .into_iter()
         .flatten()
         .collect();
-        let calm = self.checks.iter().find(|check| check.kind == Check::CALM);
+        let calm = self.checks.iter().find(|check| check.kind == CheckKind::Calm);
         let calm = calm.map_or_else(String::new, |check| format!("; {}", check.message));
         (!failed.is_empty()).then(|| format!("{}{calm}", failed.join("; ")))
     }

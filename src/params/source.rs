@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::axis::{in_unit, seconds};
 use super::place::{KeyError, Place};
-use super::{BetweenLogs, Check, Inflated, Measured, Source};
+use super::{BetweenLogs, Check, CheckKind, Inflated, Measured, Source};
 
 /// Where the numbers come from.
 #[derive(Serialize, JsonSchema)]
@@ -96,11 +96,20 @@ fn check(place: &Place<'_>) -> Result<Check, KeyError> {
     let object = place.object(&["kind", "axis", "message", "numbers"])?;
     let numbers = object.optional("numbers").map(|numbers| numbers.entries()).transpose()?.unwrap_or_default();
     Ok(Check {
-        kind: object.required("kind")?.text()?.to_string(),
+        kind: check_kind(&object.required("kind")?)?,
         axis: object.optional("axis").map(|p| p.text().map(str::to_string)).transpose()?,
         message: object.required("message")?.text()?.to_string(),
         numbers: numbers.iter().map(|(name, p)| Ok((name.to_string(), p.number()?))).collect::<Result<_, _>>()?,
     })
+}
+
+fn check_kind(place: &Place<'_>) -> Result<CheckKind, KeyError> {
+    match place.text()? {
+        "motion" => Ok(CheckKind::Motion),
+        "fit" => Ok(CheckKind::Fit),
+        "calm" => Ok(CheckKind::Calm),
+        other => Err(place.error(format!("{other}, expected motion, fit or calm"))),
+    }
 }
 
 fn between_logs(place: &Place<'_>) -> Result<BetweenLogs, KeyError> {

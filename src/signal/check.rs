@@ -45,13 +45,54 @@ pub enum TimeBase {
     MeanRate,
 }
 
+/// What was found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum FindingKind {
+    /// Stamps scatter about an even grid.
+    Jitter,
+    /// The unit of the time column looks wrong.
+    TimeUnit,
+    /// Samples are missing.
+    Gap,
+    /// A stamp comes again.
+    RepeatedStamp,
+    /// A stamp is before the one before it.
+    BackwardStamp,
+    /// The rate is not what something else says.
+    Rate,
+    /// A row of zeros among others.
+    ZeroRow,
+    /// A row is that before it.
+    RepeatedRow,
+    /// Empty or no number.
+    Nan,
+    /// Beyond what any sensor gives.
+    Overflow,
+    /// One value over and over.
+    Stuck,
+    /// At an end of the range for some time.
+    Saturated,
+    /// Few values, far apart.
+    Quantised,
+    /// Far from its surroundings.
+    Outlier,
+    /// The sensor does not rest.
+    Motion,
+    /// What part of a moving log is at rest.
+    Calm,
+    /// Which column is the temperature, or why none is.
+    Temperature,
+    /// Which table of several was read.
+    Topic,
+    /// A part of the file could not be read.
+    Damaged,
+}
+
 /// One thing found, with how often and where it is first seen (sample index, 0-based; and seconds from the start).
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Finding {
-    /// Short code: "jitter", "time-unit", "gap", "repeated-stamp", "backward-stamp", "rate", "zero-row", "repeated-row", "nan", "overflow", "stuck",
-    /// "saturated", "quantised", "outlier", "motion", "calm", "temperature", "topic",
-    /// "damaged".
-    pub kind: String,
+    pub kind: FindingKind,
     pub axis: Option<String>,
     pub count: u64,
     pub first_index: u64,
@@ -64,8 +105,8 @@ pub struct Finding {
 
 impl Finding {
     /// What is no fault but should be known.
-    pub fn note(kind: &str, message: String) -> Finding {
-        Finding { kind: kind.into(), axis: None, count: 1, first_index: 0, first_s: 0.0, message, serious: false }
+    pub fn note(kind: FindingKind, message: String) -> Finding {
+        Finding { kind, axis: None, count: 1, first_index: 0, first_s: 0.0, message, serious: false }
     }
 }
 
@@ -86,12 +127,12 @@ pub struct LogCheck {
 impl LogCheck {
     /// The axis, or the log as a whole, was found not to be at rest.
     pub fn moves(&self, axis: &str) -> bool {
-        self.findings.iter().any(|f| f.kind == "motion" && f.axis.as_deref().is_none_or(|name| name == axis))
+        self.findings.iter().any(|f| f.kind == FindingKind::Motion && f.axis.as_deref().is_none_or(|name| name == axis))
     }
 
     /// For a log that is meant to move: says nothing of it.
     pub fn expect_motion(&mut self) {
-        self.findings.retain(|finding| finding.kind != "motion" && finding.kind != "calm");
+        self.findings.retain(|finding| finding.kind != FindingKind::Motion && finding.kind != FindingKind::Calm);
     }
 }
 
@@ -278,7 +319,7 @@ impl Checker {
             let name = axis.name.clone();
             findings.extend(axis.findings(rate_hz).into_iter().map(|note| clock.finding(Some(&name), note)));
         }
-        if findings.iter().any(|finding| finding.kind == "motion") {
+        if findings.iter().any(|finding| finding.kind == FindingKind::Motion) {
             let windows: Vec<_> = self.axes.iter().map(|axis| axis.calmness(rate_hz)).collect();
             findings.extend(calm::note(&windows, self.rows, &clock).map(|note| clock.finding(None, note)));
         }
@@ -315,7 +356,7 @@ impl Checker {
             && unlikely(count as f64, by_chance(count, &|axis| axis.zeros, &together.zero.all_but))
         {
             notes.push(Note {
-                kind: "zero-row",
+                kind: FindingKind::ZeroRow,
                 count,
                 first: Some(first),
                 message: format!("{count} of {} rows are zero on every axis; kept", self.rows),
@@ -327,7 +368,7 @@ impl Checker {
             && unlikely(count as f64, by_chance(count, &|axis| axis.repeats, &together.repeated.all_but))
         {
             notes.push(Note {
-                kind: "repeated-row",
+                kind: FindingKind::RepeatedRow,
                 count,
                 first: Some(first),
                 message: format!(
@@ -343,7 +384,7 @@ impl Checker {
 
 /// A finding before its place is put into words; no place if it is about the whole log.
 struct Note {
-    kind: &'static str,
+    kind: FindingKind,
     count: u64,
     first: Option<Place>,
     message: String,
@@ -374,7 +415,7 @@ impl Clock {
         };
         let message = format!("{axis_name}{}{place}", note.message);
         Finding {
-            kind: note.kind.to_string(),
+            kind: note.kind,
             axis: axis.map(str::to_string),
             count: note.count,
             first_index: first.index,
@@ -395,11 +436,11 @@ fn time_notes(timing: &Timing, stamps: &Stamps, rate_hz: f64, rows: u64) -> Vec<
             short(timing.period),
             short(rate_hz)
         );
-        notes.push(Note { kind: "jitter", count: rows, first: None, message, serious: false });
+        notes.push(Note { kind: FindingKind::Jitter, count: rows, first: None, message, serious: false });
     } else if timing.spread > 0.05 * timing.period {
         let percent = short(100.0 * timing.spread / timing.period);
         let message = format!("time steps scatter by {} s, {percent} % of the period", short(timing.spread));
-        notes.push(Note { kind: "jitter", count: rows, first: None, message, serious: false });
+        notes.push(Note { kind: FindingKind::Jitter, count: rows, first: None, message, serious: false });
     }
     if let Some(gap) = timing.gaps.first() {
         let missing: u64 = timing.gaps.iter().map(|g| g.missing).sum();
@@ -411,7 +452,7 @@ fn time_notes(timing: &Timing, stamps: &Stamps, rate_hz: f64, rows: u64) -> Vec<
         );
         let first = Place { index: gap.index as u64, time_s: timing.first_gap_s };
         notes.push(Note {
-            kind: "gap",
+            kind: FindingKind::Gap,
             count,
             first: Some(first),
             message,
@@ -426,7 +467,7 @@ fn time_notes(timing: &Timing, stamps: &Stamps, rate_hz: f64, rows: u64) -> Vec<
             short(rate_hz),
             short(span)
         );
-        notes.push(Note { kind: "time-unit", count: 1, first: None, message, serious: true });
+        notes.push(Note { kind: FindingKind::TimeUnit, count: 1, first: None, message, serious: true });
     }
     notes
 }
@@ -434,7 +475,7 @@ fn time_notes(timing: &Timing, stamps: &Stamps, rate_hz: f64, rows: u64) -> Vec<
 fn repeated(stamps: &Stamps, notes: &mut Vec<Note>) {
     if let Count { count, first: Some(first) } = stamps.repeated {
         let message = format!("{count} rows have the time stamp of the row before; kept, evenly spaced");
-        notes.push(Note { kind: "repeated-stamp", count, first: Some(first), message, serious: false });
+        notes.push(Note { kind: FindingKind::RepeatedStamp, count, first: Some(first), message, serious: false });
     }
 }
 
@@ -447,16 +488,16 @@ fn overridden(rate_hz: f64, stamps: &Stamps, looked: Option<&Verdict>, notes: &m
     if stamped.is_finite() && (stamped / rate_hz - 1.0).abs() > 0.01 && stamps.backward.count == 0 {
         let message =
             format!("the rate given, {} Hz, replaces the {} Hz of the time stamps", short(rate_hz), short(stamped));
-        notes.push(Note { kind: "rate", count: 1, first: None, message, serious: true });
+        notes.push(Note { kind: FindingKind::Rate, count: 1, first: None, message, serious: true });
     }
     if let Count { count, first: Some(first) } = stamps.backward {
         let message =
             format!("time goes back {count} {}; the stamps are not used", if count == 1 { "time" } else { "times" });
-        notes.push(Note { kind: "backward-stamp", count, first: Some(first), message, serious: false });
+        notes.push(Note { kind: FindingKind::BackwardStamp, count, first: Some(first), message, serious: false });
     }
     if let Count { count, first: Some(first) } = stamps.repeated {
         let message = format!("{count} rows have the time stamp of the row before; the stamps are not used");
-        notes.push(Note { kind: "repeated-stamp", count, first: Some(first), message, serious: false });
+        notes.push(Note { kind: FindingKind::RepeatedStamp, count, first: Some(first), message, serious: false });
     }
 }
 

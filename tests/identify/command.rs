@@ -3,7 +3,7 @@
 use kfdesign::filter::likelihood::Stretch;
 use kfdesign::identify::{ModelChoice, identify_logs};
 use kfdesign::noise::Term;
-use kfdesign::params::{Params, TermEntry};
+use kfdesign::params::{CheckKind, Params, TermEntry};
 use kfdesign::signal::bridge::bridge;
 use kfdesign::units::Unit;
 
@@ -185,8 +185,8 @@ fn a_log_that_moves_is_a_failed_check_wherever_it_goes() {
     let failed = "the log is not at rest all the time (gyro_x)";
     assert!(out.stderr.contains(&format!("check failed: {failed}")), "{}", out.stderr);
     let params = Params::read(&bench.path("params.json")).unwrap();
-    let kinds: Vec<&str> = params.source.as_ref().unwrap().checks.iter().map(|check| &check.kind[..]).collect();
-    assert!(kinds.starts_with(&["motion", "calm"]), "{kinds:?}");
+    let kinds: Vec<CheckKind> = params.source.as_ref().unwrap().checks.iter().map(|check| check.kind).collect();
+    assert!(kinds.starts_with(&[CheckKind::Motion, CheckKind::Calm]), "{kinds:?}");
     assert_eq!(params.source.as_ref().unwrap().checks[0].numbers["of"], 20_000.0);
     assert_eq!(Params::from_json(&params.to_json(), "p").unwrap(), params);
     assert!(!bench.read("r.html").contains("log of the sensor at rest"));
@@ -228,7 +228,7 @@ fn a_fit_that_misses_the_log_is_a_failed_check() {
     assert_eq!(out.status, 1, "{}", out.stderr);
     let params = Params::read(&bench.path("params.json")).unwrap();
     let checks = &params.source.as_ref().unwrap().checks;
-    assert_eq!(checks.iter().map(|check| &check.kind[..]).collect::<Vec<_>>(), ["fit"]);
+    assert_eq!(checks.iter().map(|check| check.kind).collect::<Vec<_>>(), [CheckKind::Fit]);
     assert!(checks[0].numbers["periodogram_distance"] > checks[0].numbers["tolerated"]);
     assert!(params.failed_check().unwrap().contains("the model misses the spectrum of the log (gyro_x)"));
     let out = bench.run("identify log.csv --rate 100 --model white+osc -o params.json");

@@ -2,6 +2,7 @@
 
 use super::measured::Independent;
 use super::{Flags, assert_close, damage, read_bytes, shown};
+use kfdesign::signal::check::FindingKind;
 
 const WRITTEN: [(&str, &[u8]); 4] = [
     ("level5.mat", include_bytes!("written/level5.mat")),
@@ -28,7 +29,10 @@ fn every_written_form_gives_the_same_numbers() {
             assert_eq!((log.len(), log.axes.len()), (40, 3), "{name}");
             // "sampling_rate", or the stamps
             assert!((log.sample_rate_hz - 100.0).abs() < 1e-9, "{name}: {}", log.sample_rate_hz);
-            assert_eq!(check.findings.iter().any(|f| f.kind == "rate"), flags.last() == Some(&("time", "none")));
+            assert_eq!(
+                check.findings.iter().any(|f| f.kind == FindingKind::Rate),
+                flags.last() == Some(&("time", "none"))
+            );
             for axis in 0..3 {
                 assert_close(&shown(&log, axis), &column(axis, 40), name);
                 let sensor = if mat { "gyr" } else { "gyro" };
@@ -58,13 +62,13 @@ fn structures_groups_and_records_are_topics() {
         let (log, check) = read_bytes(name, bytes, &[("topic", "imu.omega"), ("unit", "rad/s")]).unwrap();
         assert_eq!((log.len(), log.axes[1].name.as_str()), (30, "omega_y"), "{name}");
         assert_close(&shown(&log, 1), &column(1, 30), name);
-        assert!(!check.findings.iter().any(|f| f.kind == "topic"));
+        assert!(!check.findings.iter().any(|f| f.kind == FindingKind::Topic));
         let quaternion: Flags = &[("topic", "imu.part.q"), ("unit", "rad/s"), ("columns", "q_w,q_z")];
         assert_close(&shown(&read_bytes(name, bytes, quaternion).unwrap().0, 1), &column(3, 30), name);
         // without the flag the longest table with a gyro, and it is said
         let (log, check) = read_bytes(name, bytes, &[("unit", "rad/s"), ("time", "none")]).unwrap();
         assert_eq!(log.len(), 40);
-        let note = check.findings.iter().find(|f| f.kind == "topic").unwrap();
+        let note = check.findings.iter().find(|f| f.kind == FindingKind::Topic).unwrap();
         assert!(note.message.contains("imu.omega (30 rows)"), "{}", note.message);
     }
     for (name, bytes) in &WRITTEN[2..] {

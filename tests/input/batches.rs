@@ -1,6 +1,7 @@
 //! Batches of raw samples in ArduPilot DataFlash logs.
 
 use kfdesign::signal::LogCheck;
+use kfdesign::signal::check::FindingKind;
 
 use super::measured::Independent;
 use super::{Flags, damage, read_bytes};
@@ -84,7 +85,7 @@ fn a_batch_is_samples_of_one_sensor_in_si_at_their_own_times() {
     rate(&check, 1000.0);
     let gaps: Vec<(usize, u64)> = gyro.gaps.iter().map(|gap| (gap.index, gap.missing)).collect();
     assert_eq!(gaps, [(96, 504), (128, 32)]);
-    let damaged = check.findings.iter().find(|finding| finding.kind == "damaged").unwrap();
+    let damaged = check.findings.iter().find(|finding| finding.kind == FindingKind::Damaged).unwrap();
     assert!(damaged.message.contains("1 ISBD messages whose batch has no ISBH"), "{}", damaged.message);
     let (accel, check) = read_bytes("log.bin", log(), &[("topic", "isb_accel:0")]).unwrap();
     assert_eq!((accel.len(), accel.start_s), (64, 1.2));

@@ -1,7 +1,7 @@
 //! Measured logs: counts, rates, first and last values and means as an independent reader gives them, and known defects.
 
 use kfdesign::input::{self, Block, LogReader};
-use kfdesign::signal::check::TimeBase;
+use kfdesign::signal::check::{FindingKind, TimeBase};
 
 use super::super::support::measured;
 use super::{Flags, assert_close, options, shown};
@@ -298,21 +298,24 @@ fn the_check_finds_the_known_defects_of_measured_logs() {
     let found = |path: &str, flags: Flags| measured(path).map(|p| input::read(&p, &options(flags)).unwrap().1.findings);
     let set1 = "static/sunsided_sensor-fusion/derived/set-1_unmoved-z-pointing-left.csv.gz";
     let Some(findings) = found(set1, &[("rate", "100")]) else { return };
-    let zero = findings.iter().find(|f| f.kind == "zero-row").unwrap();
+    let zero = findings.iter().find(|f| f.kind == FindingKind::ZeroRow).unwrap();
     assert_eq!((zero.count, zero.first_index, zero.serious), (720, 6280, true));
-    assert!(findings.iter().any(|f| f.kind == "backward-stamp" && f.count == 1 && f.first_index == 6280));
+    assert!(findings.iter().any(|f| f.kind == FindingKind::BackwardStamp && f.count == 1 && f.first_index == 6280));
     let lsb: Flags = &[("unit", "1/131 deg/s"), ("rate", "100"), ("columns", "gx,gy,gz")];
     let findings = found("motion/tomisuarez2_ImuCalibration/example_data_calibration.csv", lsb).unwrap();
     // ten samples at -32768, the end of 16 bits
-    assert!(findings.iter().any(|f| f.kind == "saturated" && f.count == 10 && f.axis.as_deref() == Some("gx")));
-    assert!(findings.iter().any(|f| f.kind == "motion" && f.serious));
+    assert!(
+        findings.iter().any(|f| f.kind == FindingKind::Saturated && f.count == 10 && f.axis.as_deref() == Some("gx"))
+    );
+    assert!(findings.iter().any(|f| f.kind == FindingKind::Motion && f.serious));
     let adis = found("static/SMAC-Group_imudata/adis16405_recording1.csv.gz", &[("rate", "100")]).unwrap();
-    assert!(adis.iter().all(|f| f.kind == "quantised" && !f.serious) && adis.len() == 3, "{adis:?}");
+    assert!(adis.iter().all(|f| f.kind == FindingKind::Quantised && !f.serious) && adis.len() == 3, "{adis:?}");
     assert!(adis[0].message.contains("0.05 deg/s"), "{}", adis[0].message);
     let ten =
         found("static/sunsided_sensor-fusion/derived/set-2_unmoved-with-x-pointing-forward-10min.csv.gz", &[]).unwrap();
-    let kinds: Vec<&str> = ten.iter().map(|f| f.kind.as_str()).collect();
-    assert_eq!(kinds, ["jitter", "quantised", "quantised", "quantised"]);
+    let kinds: Vec<FindingKind> = ten.iter().map(|f| f.kind).collect();
+    let quantised = FindingKind::Quantised;
+    assert_eq!(kinds, [FindingKind::Jitter, quantised, quantised, quantised]);
 }
 
 /// Logs that are refused, each for a reason that it names.

@@ -1,6 +1,7 @@
 //! Flight logs and bags: measured files against their own projects' readers, what is chosen of them, and damaged ones.
 
 use kfdesign::input::{self, inspect::inspect};
+use kfdesign::signal::check::FindingKind;
 
 use super::super::support::measured;
 use super::measured::Independent;
@@ -260,7 +261,7 @@ fn what_was_found_is_said_where_nothing_fits() {
     // filtered rates are read when asked for
     let (log, check) = input::read(&path, &options(&[("topic", "vehicle_angular_velocity")])).unwrap();
     assert_eq!((log.len(), log.axes[0].name.as_str()), (326, "gyro_x"));
-    assert!(!check.findings.iter().any(|finding| finding.kind == "topic"));
+    assert!(!check.findings.iter().any(|finding| finding.kind == FindingKind::Topic));
 }
 
 #[test]

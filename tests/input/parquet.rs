@@ -1,6 +1,7 @@
 //! Parquet files: small ones written by pyarrow 26.0.1, polars 2.1.0 and fastparquet 2026.9.0 (`written/write_parquet.py` says what is in them).
 
 use kfdesign::input::inspect::inspect;
+use kfdesign::signal::check::FindingKind;
 
 use super::super::support::Bench;
 use super::{Flags, assert_close, damage, read_bytes, shown};
@@ -35,13 +36,13 @@ fn every_compression_and_writer_gives_the_same_numbers() {
         assert_eq!((log.len(), log.axes.len(), log.start_s), (40, 3, start_s), "{name}");
         // stamps are whole numbers of the file's unit: exact but for the division
         assert!((log.sample_rate_hz - 100.0).abs() < 1e-12, "{name}: {}", log.sample_rate_hz);
-        assert!(!check.findings.iter().any(|f| f.kind == "nan"), "{name}");
+        assert!(!check.findings.iter().any(|f| f.kind == FindingKind::Nan), "{name}");
         for axis in 0..3 {
             assert_close(&shown(&log, axis), &column(axis), name);
         }
     }
     let (log, check) = read_bytes("snappy.parquet", USUAL[0].1, &[("sensor", "accel")]).unwrap();
-    let missing = check.findings.iter().find(|f| f.kind == "nan").unwrap();
+    let missing = check.findings.iter().find(|f| f.kind == FindingKind::Nan).unwrap();
     assert_eq!((missing.count, missing.first_index), (1, 7));
     // on both sides of the missing number, and of the border between the row groups at row 25
     let expected: Vec<f64> = column(0).iter().enumerate().map(|(i, x)| if i == 7 { f64::NAN } else { *x }).collect();

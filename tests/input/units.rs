@@ -2,6 +2,7 @@
 
 use super::super::support::Bench;
 use super::{assert_close, read, read_bytes, refused, shown};
+use kfdesign::signal::check::FindingKind;
 
 #[test]
 fn counts_of_a_converter_end_at_the_door() {
@@ -86,7 +87,12 @@ fn a_line_fs_before_the_table_is_the_rate() {
     let rows: String = (0..300).map(|i| format!("{},{}\n", (i * 7919) % 131, i % 7)).collect();
     let (log, check) = read(&format!("Fs,100\n\ngx_dps,gy_dps\n{rows}"), &[]).unwrap();
     assert_eq!(log.sample_rate_hz, 100.0);
-    assert!(check.findings.iter().any(|f| f.kind == "rate" && f.message == "100 Hz by 'Fs' of the file" && !f.serious));
+    assert!(
+        check
+            .findings
+            .iter()
+            .any(|f| f.kind == FindingKind::Rate && f.message == "100 Hz by 'Fs' of the file" && !f.serious)
+    );
     // other names must say hertz
     let rows: String = (0..300).map(|i| format!("{},{},1\n", (i * 7919) % 131, i % 7)).collect();
     assert!(refused(&format!("Sample rate,100\n\ngx_dps,gy_dps,n\n{rows}"), &[]).contains("no sample rate"));
@@ -98,7 +104,7 @@ fn a_rate_that_no_sensor_has_is_questioned() {
     let log = |unit: &str, step: f64, rows: i32| {
         let rows: String = (0..rows).map(|i| format!("{:.6},{}\n", f64::from(i) * step, (i * 7919) % 131)).collect();
         let (_, check) = read(&format!("time ({unit}),gx_dps\n{rows}"), &[]).unwrap();
-        let asked = |f: &&kfdesign::signal::check::Finding| f.kind == "time-unit";
+        let asked = |f: &&kfdesign::signal::check::Finding| f.kind == FindingKind::TimeUnit;
         check.findings.iter().find(asked).map(|f| (f.serious, f.message.clone()))
     };
     let (serious, message) = log("ms", 0.01, 10_000).unwrap();

@@ -1,6 +1,7 @@
 //! Headers as vendors' programs and phone apps write them; the rows below are made here. Measured exports are in `measured`.
 
 use super::{Flags, read, refused};
+use kfdesign::signal::check::FindingKind;
 
 /// A header and so many rows: the first column k × step, in the others k + column.
 fn export(header: &str, separator: char, step: f64) -> String {
@@ -92,7 +93,11 @@ fn exports_are_read_by_their_headers() {
         let names: Vec<&str> = log.axes.iter().map(|axis| axis.name.as_str()).collect();
         assert_eq!(names, axes);
         assert!((log.sample_rate_hz / rate_hz - 1.0).abs() < 1e-9, "{} Hz: {text}", log.sample_rate_hz);
-        let said = check.findings.iter().find(|finding| finding.kind == "rate").map(|finding| finding.message.as_str());
+        let said = check
+            .findings
+            .iter()
+            .find(|finding| finding.kind == FindingKind::Rate)
+            .map(|finding| finding.message.as_str());
         assert_eq!(said, by);
     }
     // the unit is asked for first, then what the stamps are

@@ -5,17 +5,18 @@ use std::path::Path;
 use super::Axis;
 use crate::cli::Status;
 use crate::cli::output::say;
-use crate::params::{Check, Params};
+use crate::params::{Check, CheckKind, Params};
 use crate::signal::LogCheck;
+use crate::signal::check::FindingKind;
 
 /// What was found wrong with the logs and the fits. Without motion no part is named.
 pub(super) fn checks(logs: &[LogCheck], axes: &[Axis]) -> Vec<Check> {
     let several = logs.len() > 1;
-    let named = |kind: &'static str| {
+    let named = |wanted: FindingKind, kind: CheckKind| {
         logs.iter().enumerate().flat_map(move |(i, check)| {
             let of = if several { format!("log {}: ", i + 1) } else { String::new() };
-            check.findings.iter().filter(move |finding| finding.kind == kind).map(move |finding| Check {
-                kind: kind.into(),
+            check.findings.iter().filter(move |finding| finding.kind == wanted).map(move |finding| Check {
+                kind,
                 axis: finding.axis.clone(),
                 message: format!("{of}{}", finding.message),
                 numbers: [
@@ -28,7 +29,9 @@ pub(super) fn checks(logs: &[LogCheck], axes: &[Axis]) -> Vec<Check> {
             })
         })
     };
-    named(Check::MOTION).chain(named(Check::CALM)).chain(axes.iter().filter_map(|axis| axis.found.missed())).collect()
+    let motion = named(FindingKind::Motion, CheckKind::Motion);
+    let calm = named(FindingKind::Calm, CheckKind::Calm);
+    motion.chain(calm).chain(axes.iter().filter_map(|axis| axis.found.missed())).collect()
 }
 
 /// A failed check is said on stderr, in one line.

@@ -21,7 +21,7 @@ use super::calm::AxisWindows;
 use super::robust::{Sample, median, median_and_spread, quantile, short};
 use super::stamps::Count;
 use super::windows::{Extent, Windows, surely_quiet};
-use super::{InputKind, Note, Place, Places, unlikely};
+use super::{FindingKind, InputKind, Note, Place, Places, unlikely};
 use crate::numerics::distribution::chi_square_quantile;
 use crate::numerics::optimize::bracketed_root;
 use crate::numerics::reduce::Moments;
@@ -325,9 +325,9 @@ impl AxisCheck {
     fn nan_finding(&self, out: &mut Vec<Note>) {
         let all = self.usable + self.nan.count + self.vast.count;
         let kinds = [
-            ("nan", self.nan, "empty or not a number; skipped, not replaced".to_string()),
+            (FindingKind::Nan, self.nan, "empty or not a number; skipped, not replaced".to_string()),
             (
-                "overflow",
+                FindingKind::Overflow,
                 self.vast,
                 format!("infinite or beyond {LARGEST:e} in SI, which no sensor gives; skipped, not replaced"),
             ),
@@ -357,7 +357,7 @@ impl AxisCheck {
         }
         if let Some(first) = first {
             out.push(Note {
-                kind: "stuck",
+                kind: FindingKind::Stuck,
                 count: samples,
                 first: Some(first),
                 message: format!(
@@ -377,7 +377,7 @@ impl AxisCheck {
             if count >= 5 && count > 3 * end.inner_count && far && self.range.0 < self.range.1 {
                 let value = self.show(sign * end.value);
                 out.push(Note {
-                    kind: "saturated",
+                    kind: FindingKind::Saturated,
                     count,
                     first: Some(first),
                     message: format!(
@@ -396,7 +396,7 @@ impl AxisCheck {
         let share = if noise > 0.0 { format!(", {} of the noise", short(step / noise)) } else { String::new() };
         let meaning = if coarse { ": the noise is hidden below the steps, and its density cannot be read" } else { "" };
         out.push(Note {
-            kind: "quantised",
+            kind: FindingKind::Quantised,
             count: self.usable,
             first: None,
             message: format!("values come in steps of {}{share}{meaning}", self.show(step)),
@@ -407,7 +407,7 @@ impl AxisCheck {
     fn outlier(&self, out: &mut Vec<Note>) {
         let Count { count, first: Some(first) } = self.outliers else { return };
         out.push(Note {
-            kind: "outlier",
+            kind: FindingKind::Outlier,
             count,
             first: Some(first),
             message: format!(
@@ -463,7 +463,7 @@ impl AxisCheck {
         let mean = means.iter().sum::<f64>() / means.len() as f64;
         let seconds = self.rest.size as f64 / rate_hz;
         let finding = |count: u64, first: Option<Place>, what: String| Note {
-            kind: "motion",
+            kind: FindingKind::Motion,
             count,
             first,
             message: format!("not at rest: {what}"),

@@ -18,13 +18,13 @@ fn check(values: &[f64], kind: InputKind) -> Vec<Note> {
     axis.findings(100.0)
 }
 
-fn kinds(values: &[f64]) -> Vec<&'static str> {
+fn kinds(values: &[f64]) -> Vec<FindingKind> {
     check(values, InputKind::Rate).iter().map(|f| f.kind).collect()
 }
 
-fn only(values: &[f64], kind: &str) -> (u64, u64, bool) {
+fn only(values: &[f64], kind: FindingKind) -> (u64, u64, bool) {
     let found = check(values, InputKind::Rate);
-    let note = found.iter().find(|f| f.kind == kind).unwrap_or_else(|| panic!("no {kind} among {}", found.len()));
+    let note = found.iter().find(|f| f.kind == kind).unwrap_or_else(|| panic!("no {kind:?} among {}", found.len()));
     (note.count, note.first.map_or(0, |p| p.index), note.serious)
 }
 
@@ -46,24 +46,24 @@ fn each_defect_is_found_once_with_count_and_place() {
         x
     };
     let nan = with(&|x| (500..510).for_each(|i| x[i] = f64::NAN));
-    assert_eq!((kinds(&nan), only(&nan, "nan")), (vec!["nan"], (10, 500, false)));
+    assert_eq!((kinds(&nan), only(&nan, FindingKind::Nan)), (vec![FindingKind::Nan], (10, 500, false)));
     let stuck = with(&|x| (700..720).for_each(|i| x[i] = x[699]));
-    assert_eq!((kinds(&stuck), only(&stuck, "stuck")), (vec!["stuck"], (21, 699, true)));
+    assert_eq!((kinds(&stuck), only(&stuck, FindingKind::Stuck)), (vec![FindingKind::Stuck], (21, 699, true)));
     let outlier = with(&|x| (0..3).for_each(|i| x[5000 + 2000 * i] += 2.0 * DEG));
-    assert_eq!((kinds(&outlier), only(&outlier, "outlier")), (vec!["outlier"], (3, 5000, true)));
+    assert_eq!((kinds(&outlier), only(&outlier, FindingKind::Outlier)), (vec![FindingKind::Outlier], (3, 5000, true)));
     let limited = with(&|x| x.iter_mut().for_each(|v| *v = v.min(0.22 * DEG)));
     let above = rest.iter().filter(|v| **v >= 0.22 * DEG).count() as u64;
     let first = rest.iter().position(|v| *v >= 0.22 * DEG).unwrap() as u64;
-    assert_eq!(only(&limited, "saturated"), (above, first, true));
+    assert_eq!(only(&limited, FindingKind::Saturated), (above, first, true));
     let lowest = with(&|x| x.iter_mut().for_each(|v| *v = v.max(-0.22 * DEG)));
-    assert!(kinds(&lowest).contains(&"saturated"));
+    assert!(kinds(&lowest).contains(&FindingKind::Saturated));
     let moved = with(&|x| (8000..9000).for_each(|i| x[i] += 5.0 * DEG * ((i as f64) / 20.0).sin()));
-    let (_, first, serious) = only(&moved, "motion");
+    let (_, first, serious) = only(&moved, FindingKind::Motion);
     assert!(serious && first.abs_diff(8000) < 64, "{first}");
     let turning = with(&|x| x.iter_mut().for_each(|v| *v += 40.0 * DEG));
-    assert_eq!((kinds(&turning), only(&turning, "motion")), (vec!["motion"], (20_000, 0, true)));
+    assert_eq!((kinds(&turning), only(&turning, FindingKind::Motion)), (vec![FindingKind::Motion], (20_000, 0, true)));
     let swaying = with(&|x| x.iter_mut().enumerate().for_each(|(i, v)| *v += 4.0 * DEG * (i as f64 / 3e3).sin()));
-    assert_eq!(only(&swaying, "motion"), (20_000, 0, true));
+    assert_eq!(only(&swaying, FindingKind::Motion), (20_000, 0, true));
 }
 
 #[test]
@@ -76,11 +76,11 @@ fn the_quantisation_step_is_measured_also_through_printing() {
         let mut sample = x.clone();
         let found = quantisation_step(&mut sample).unwrap();
         assert!((found / step - 1.0).abs() < 1e-3, "{found}");
-        assert_eq!((kinds(x), only(x, "quantised")), (vec!["quantised"], (20_000, 0, false)));
+        assert_eq!((kinds(x), only(x, FindingKind::Quantised)), (vec![FindingKind::Quantised], (20_000, 0, false)));
     }
     // the noise is below the steps
     let hidden: Vec<f64> = noise(20_000, 0.1 * DEG, 3).iter().map(|x| (x / (0.3 * DEG)).round() * 0.3 * DEG).collect();
-    assert!(only(&hidden, "quantised").2);
+    assert!(only(&hidden, FindingKind::Quantised).2);
     assert!(quantisation_step(&mut noise(20_000, 1.0, 4)).is_none());
 }
 
@@ -97,7 +97,7 @@ fn increments_and_integrals_are_judged_as_the_rate_they_make() {
     assert!(check(&angle, InputKind::Angle).is_empty());
     let turning: Vec<f64> = angle.iter().enumerate().map(|(i, a)| a + 30.0 * DEG * i as f64 * 0.01).collect();
     let found = check(&turning, InputKind::Angle);
-    assert_eq!(found.iter().map(|f| f.kind).collect::<Vec<_>>(), ["motion"]);
+    assert_eq!(found.iter().map(|f| f.kind).collect::<Vec<_>>(), [FindingKind::Motion]);
     assert!(
         found[0].message.contains("the mean is 30 deg/s") || found[0].message.contains("29.99 deg/s"),
         "{}",
@@ -121,7 +121,7 @@ fn low_passed(n: usize, pole: f64, axis: u32) -> Vec<f64> {
 /// made for 1 of 10⁶ logs; that the variance of a window has a chi-square law is an approximation, so that none of 60 is what is asked. A burst of thirty times the noise is found in each.
 #[test]
 fn low_passed_noise_and_outliers_are_no_motion() {
-    let moves = |x: &[f64]| kinds(x).contains(&"motion");
+    let moves = |x: &[f64]| kinds(x).contains(&FindingKind::Motion);
     for (k, pole) in [0.0, 0.5, 0.8, 0.9, 0.95, 0.99].into_iter().enumerate() {
         for run in 0..8 {
             let mut x = low_passed(if run % 2 == 0 { 20_000 } else { 100_000 }, pole, 100 + 10 * k as u32 + run);

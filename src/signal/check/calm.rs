@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use super::windows::{PIECE, Windows};
-use super::{Clock, Note, Place};
+use super::{Clock, FindingKind, Note, Place};
 use crate::numerics::reduce::Moments;
 
 /// Windows of which the calmest ones are sought: fewer say too little of a standard deviation's usual scatter.
@@ -54,7 +54,7 @@ pub(super) fn note(axes: &[AxisWindows], rows: u64, clock: &Clock) -> Option<Not
         flags.push(format!("`end` {}", shown(clock.seconds(end), f64::floor)));
     }
     Some(Note {
-        kind: "calm",
+        kind: FindingKind::Calm,
         count,
         first: Some(first),
         message: format!("calmest on every axis: the {count} samples that {} leaves", flags.join(" ")),

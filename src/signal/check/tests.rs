@@ -35,10 +35,10 @@ fn rate_gaps_and_stamps_are_reported_with_their_place() {
     let check = checked(&times, &[values(n, 0.0), values(n, 1.0)], None);
     assert_eq!((check.samples, check.missing, check.time_base), (3000, 5, TimeBase::Stamps));
     assert!((check.sample_rate_hz - 100.0).abs() < 1e-6 && (check.span_s - 30.05).abs() < 1e-6);
-    let gap = check.findings.iter().find(|f| f.kind == "gap").unwrap();
+    let gap = check.findings.iter().find(|f| f.kind == FindingKind::Gap).unwrap();
     assert_eq!((gap.count, gap.first_index), (1, 1000));
     assert!((gap.first_s - 10.05).abs() < 1e-9 && gap.message.contains("5 samples missing"), "{}", gap.message);
-    let repeated = check.findings.iter().find(|f| f.kind == "repeated-stamp").unwrap();
+    let repeated = check.findings.iter().find(|f| f.kind == FindingKind::RepeatedStamp).unwrap();
     assert_eq!((repeated.count, repeated.first_index), (1, 2000));
 }
 
@@ -54,9 +54,9 @@ fn backward_time_is_an_error_unless_the_rate_is_given() {
     assert_eq!((back.part, back.row, back.from_s, back.to_s), (1, 10, 59.0, 3.0));
     let check = checked(&times, &columns, Some(1.0));
     assert_eq!(check.time_base, TimeBase::Given);
-    assert!(check.findings.iter().any(|f| f.kind == "backward-stamp" && f.count == 1 && f.first_index == 60));
+    assert!(check.findings.iter().any(|f| f.kind == FindingKind::BackwardStamp && f.count == 1 && f.first_index == 60));
     let other = checked(&(0..100).map(f64::from).collect::<Vec<_>>(), &columns, Some(2.0));
-    assert!(other.findings.iter().any(|f| f.kind == "rate" && f.serious));
+    assert!(other.findings.iter().any(|f| f.kind == FindingKind::Rate && f.serious));
 }
 
 #[test]
@@ -64,13 +64,13 @@ fn rows_of_zeros_and_repeated_rows_are_counted() {
     let (mut x, mut y) = (values(5000, 0.0), values(5000, 1.0));
     (x[42], y[42]) = (0.0, 0.0);
     let check = checked(&[], &[x.clone(), y.clone()], Some(100.0));
-    let zero = check.findings.iter().find(|f| f.kind == "zero-row").unwrap();
+    let zero = check.findings.iter().find(|f| f.kind == FindingKind::ZeroRow).unwrap();
     assert_eq!((zero.count, zero.first_index, zero.serious), (1, 42, false));
     for i in (1..5000).step_by(2) {
         (x[i], y[i]) = (x[i - 1], y[i - 1]);
     }
     let check = checked(&[], &[x, y], Some(100.0));
-    let repeated = check.findings.iter().find(|f| f.kind == "repeated-row").unwrap();
+    let repeated = check.findings.iter().find(|f| f.kind == FindingKind::RepeatedRow).unwrap();
     assert_eq!((repeated.count, repeated.first_index, repeated.serious), (2500, 1, true));
 }
 
@@ -88,7 +88,7 @@ fn repeated_rows_are_counted_from_part_to_part() {
         checker.push(&[Samples { times: &[], axes: vec![x, y] }]).unwrap();
     }
     let Outcome::Done { check, .. } = checker.finish() else { panic!("a rate was given") };
-    let repeated = check.findings.iter().find(|f| f.kind == "repeated-row").unwrap();
+    let repeated = check.findings.iter().find(|f| f.kind == FindingKind::RepeatedRow).unwrap();
     assert_eq!((repeated.count, repeated.first_index), (499, 10));
 }
 
@@ -102,6 +102,6 @@ fn zeros_of_a_coarse_sensor_are_no_finding() {
         x.iter().map(|v| if *v > 0.0 { 0.0 } else { 1e-3 }).collect::<Vec<_>>()
     };
     let check = checked(&[], &[coarse(0), coarse(1)], Some(100.0));
-    let kinds: Vec<&str> = check.findings.iter().map(|f| f.kind.as_str()).collect();
-    assert!(!kinds.contains(&"zero-row") && !kinds.contains(&"repeated-row"), "{kinds:?}");
+    let kinds: Vec<FindingKind> = check.findings.iter().map(|f| f.kind).collect();
+    assert!(!kinds.contains(&FindingKind::ZeroRow) && !kinds.contains(&FindingKind::RepeatedRow), "{kinds:?}");
 }

@@ -1,6 +1,7 @@
 //! Consistency statistics against closed forms, scipy and statsmodels, and their measured sizes under the null hypothesis.
 
 use approx::assert_relative_eq;
+use kfdesign::consistency::TestKind;
 use kfdesign::consistency::effect::{self, Effect};
 use kfdesign::consistency::low_frequency::{LowFrequency, block_lengths, detectable_ratio, time_constants};
 use kfdesign::consistency::multiplicity::{holm, judge};
@@ -107,7 +108,7 @@ fn mean_tests_are_two_sided() {
         let beyond = if tendency == "optimistic" { 1.001 } else { 0.999 };
         let outside = mean_of_chi_squares(mean * 40.0 * beyond, 40, 2.0, 0.01);
         assert_eq!(outside.tendency(), tendency);
-        assert!(outside.nees("x", "nees").meaning.contains(tendency));
+        assert!(outside.nees("x").meaning.contains(tendency));
         assert!(outside.nis("x", 0.1, 0.01).meaning.contains(tendency));
     }
     assert_eq!(mean_of_chi_squares(80.0, 40, 2.0, 0.01).tendency(), "as predicted");
@@ -290,7 +291,7 @@ fn holm_adjustment() {
 }
 
 fn test_with(p: f64, effect: Option<[f64; 3]>) -> Test {
-    let test = Test::new("x", "t", 0.0, [0.0, 0.0], p, String::new());
+    let test = Test::new("x", TestKind::Nees, 0.0, [0.0, 0.0], p, String::new());
     match effect {
         Some([low, value, high]) => test.with_effect(Effect::new("e", value, [low, high], [-0.1, 0.1])),
         None => test,
@@ -302,8 +303,8 @@ fn test_with(p: f64, effect: Option<[f64; 3]>) -> Test {
 fn what_is_no_number_never_passes() {
     let none = [(f64::NAN, 0.5), (0.0, f64::NAN), (f64::INFINITY, 0.5), (f64::NAN, f64::NAN)];
     for (statistic, p) in none {
-        let test = || Test::new("x", "t", statistic, [0.0, 1.0], p, "all is well".into());
-        let sound = || Test::new("x", "u", 0.5, [0.0, 1.0], 0.5, "all is well".into());
+        let test = || Test::new("x", TestKind::Nees, statistic, [0.0, 1.0], p, "all is well".into());
+        let sound = || Test::new("x", TestKind::Nis, 0.5, [0.0, 1.0], 0.5, "all is well".into());
         assert!(!test().pass() && !test().has_numbers() && test().meaning.contains("nothing can be said"));
         assert!(!sound().pass(), "before it is judged");
         let mut tests = [test(), sound()];

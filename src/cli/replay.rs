@@ -16,7 +16,7 @@ use super::output::{digits, print_json, print_text, progress, say, shown_unit, t
 use super::tests_table::{TESTS, caption, rows};
 use super::{Status, VerdictFlags};
 use crate::cli::checked;
-use crate::consistency::Test;
+use crate::consistency::{Test, TestKind};
 use crate::export::atomic;
 use crate::export::table::TableWriter;
 use crate::filter::{AttitudeDesign, FilterDesign, Form};
@@ -176,7 +176,7 @@ fn say_rates(design: &FilterDesign, result: &ReplayResult) {
 
 /// One line on stderr when the wideband noise of a log at rest is not that of the design.
 fn say_follow(args: &Args, result: &ReplayResult) {
-    let other = |test: &&Test| !test.pass() && ["nis", "whiteness"].contains(&test.name.as_str());
+    let other = |test: &&Test| !test.pass() && [TestKind::Nis, TestKind::Whiteness].contains(&test.kind);
     let mut axes: Vec<&str> = result.tests.iter().filter(other).map(|test| test.axis.as_str()).collect();
     axes.dedup();
     if !axes.is_empty() && args.follow.is_none() && args.form == FormFlag::Joseph && !args.smooth {

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::CompareError;
 use crate::allan::{self, AllanCurve, Deviation, TauGrid, edf};
 use crate::consistency::effect::VARIANCE_RATIO_TOLERANCE;
-use crate::consistency::{Effect, Test};
+use crate::consistency::{Effect, Test, TestKind};
 use crate::noise::NoiseModel;
 use crate::numerics::distribution::{chi_square_cdf, chi_square_quantile, chi_square_sf, normal_quantile, normal_sf};
 use crate::numerics::largest_normal::LargestNormal;
@@ -109,7 +109,7 @@ pub(super) fn allan_curve(
     };
     let interval = [ratio(shown) / edge(shown, bound), ratio(shown) / edge(shown, -bound)];
     let tolerated = VARIANCE_RATIO_TOLERANCE.sqrt();
-    let test = Test::new(axis, "allan_curve", statistic, [-bound, bound], law.tail(statistic.abs()), meaning)
+    let test = Test::new(axis, TestKind::AllanCurve, statistic, [-bound, bound], law.tail(statistic.abs()), meaning)
         .with_averaging(envelope.tau_s[shown])
         .with_effect(Effect::new("allan_deviation_ratio", ratio(shown), interval, [1.0 / tolerated, tolerated]));
     Ok((envelope, test))

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::LogAxis;
-use crate::consistency::Test;
+use crate::consistency::{Test, TestKind};
 use crate::input::Block;
 use crate::numerics::reduce::mean;
 use crate::params::{AxisParams, Measured, Params};
@@ -13,7 +13,7 @@ use crate::tune::{TuneOptions, tune};
 use crate::units::{Quantity, Unit};
 
 /// Tests of a replay that judge the noise model: where the log starts is no matter of it, and slow drift is the Allan curve's.
-const JUDGED: [&str; 2] = ["nis", "whiteness"];
+const JUDGED: [TestKind; 2] = [TestKind::Nis, TestKind::Whiteness];
 /// Samples handed to the filter at a time.
 const BLOCK: usize = 4096;
 
@@ -57,7 +57,7 @@ pub(super) fn innovations(
         }
     }
     let result = replayer.finish();
-    let tests = result.tests.into_iter().filter(|t| JUDGED.contains(&t.name.as_str())).collect();
+    let tests = result.tests.into_iter().filter(|t| JUDGED.contains(&t.kind)).collect();
     let (nis, whiteness) = result.axes.into_iter().next().map_or((None, None), |a| (a.nis, a.whiteness));
     Ok((Innovations { nis, whiteness }, tests))
 }

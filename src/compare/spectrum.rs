@@ -8,7 +8,7 @@ use super::curve::{farthest, normal_score};
 use crate::consistency::effect::{PERIODOGRAM_TOLERANCE, VARIANCE_RATIO_TOLERANCE};
 use crate::consistency::spectrum::departure;
 use crate::consistency::whiteness::kolmogorov_quantile;
-use crate::consistency::{Effect, Test};
+use crate::consistency::{Effect, Test, TestKind};
 use crate::noise::{Grid, NoiseModel, Term};
 use crate::numerics::distribution::{chi_square_quantile, normal_quantile, normal_sf};
 use crate::signal::cosine::cosine_transform;
@@ -141,12 +141,8 @@ pub(super) fn spectrum(axis: &str, ratios: &Ratios, alpha: f64) -> (Vec<Band>, [
     };
     let interval = [band.ratio / band.upper, band.ratio / band.lower];
     let tolerance = [1.0 / VARIANCE_RATIO_TOLERANCE, VARIANCE_RATIO_TOLERANCE];
-    let banded = Test::new(axis, "spectrum_ratio", z[at], [-bound, bound], p_value, meaning).with_effect(Effect::new(
-        "band_power_ratio",
-        band.ratio,
-        interval,
-        tolerance,
-    ));
+    let banded = Test::new(axis, TestKind::SpectrumRatio, z[at], [-bound, bound], p_value, meaning)
+        .with_effect(Effect::new("band_power_ratio", band.ratio, interval, tolerance));
     (bands, [banded, cumulative(axis, ratios, alpha)])
 }
 
@@ -169,5 +165,6 @@ fn cumulative(axis: &str, ratios: &Ratios, alpha: f64) -> Test {
         [(size - bound).max(0.0), size + bound],
         [0.0, PERIODOGRAM_TOLERANCE],
     );
-    Test::new(axis, "cumulative_spectrum", found.distance, [-bound, bound], found.p_value, meaning).with_effect(effect)
+    Test::new(axis, TestKind::CumulativeSpectrum, found.distance, [-bound, bound], found.p_value, meaning)
+        .with_effect(effect)
 }

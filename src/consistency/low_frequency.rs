@@ -6,10 +6,10 @@
 //! the filter says. Lengths run from a quarter of the filter's time constant to several of it. Bartlett's cumulative periodogram of the block means
 //! looks at the shape of the same band.
 
-use super::Test;
 use super::effect::{Effect, VARIANCE_RATIO_TOLERANCE};
 use super::normalized::mean_of_chi_squares;
 use super::whiteness::{CumulativePeriodogram, cumulative_periodogram};
+use super::{Test, TestKind};
 use crate::numerics::distribution::chi_square_quantile;
 use crate::units::digits;
 
@@ -224,7 +224,7 @@ impl BlockResult {
         } else {
             format!("averaged over {} s the innovations have the predicted power", digits(seconds))
         };
-        Test::new(axis, "low_frequency", self.ratio, [self.lower, self.upper], self.p_value, meaning)
+        Test::new(axis, TestKind::LowFrequency, self.ratio, [self.lower, self.upper], self.p_value, meaning)
             .with_averaging(seconds)
             .with_effect(Effect::new(
                 "variance_ratio",

@@ -43,11 +43,76 @@ impl Verdict {
 /// Of a test whose statistic or p-value is none.
 const NO_NUMBER: &str = "its numbers are too large to be computed, or missing: nothing can be said";
 
+/// What a test looks at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TestKind {
+    /// Normalised squared estimation errors at one time.
+    Nees,
+    /// The same over all times.
+    NeesAverage,
+    /// Errors have a mean.
+    MeanError,
+    /// Normalised squared innovations.
+    Nis,
+    /// Innovations have a mean.
+    InnovationMean,
+    /// Of innovations over runs, the largest lag.
+    Autocorrelation,
+    /// Autocorrelation of innovations, the largest lag.
+    Whiteness,
+    /// All lags together.
+    LjungBox,
+    /// Of innovations against a straight line.
+    CumulativePeriodogram,
+    /// Averages of innovations against what is predicted.
+    LowFrequency,
+    /// The estimate before the log against the log.
+    Start,
+    /// How many samples the gate refused.
+    Rejected,
+    /// The Allan curve of a log against the model's.
+    AllanCurve,
+    /// Bands of the spectrum of a log over the model's.
+    SpectrumRatio,
+    /// The cumulative spectrum of a log over the model's.
+    CumulativeSpectrum,
+}
+
+impl TestKind {
+    /// As in documents.
+    pub fn name(self) -> &'static str {
+        match self {
+            TestKind::Nees => "nees",
+            TestKind::NeesAverage => "nees_average",
+            TestKind::MeanError => "mean_error",
+            TestKind::Nis => "nis",
+            TestKind::InnovationMean => "innovation_mean",
+            TestKind::Autocorrelation => "autocorrelation",
+            TestKind::Whiteness => "whiteness",
+            TestKind::LjungBox => "ljung_box",
+            TestKind::CumulativePeriodogram => "cumulative_periodogram",
+            TestKind::LowFrequency => "low_frequency",
+            TestKind::Start => "start",
+            TestKind::Rejected => "rejected",
+            TestKind::AllanCurve => "allan_curve",
+            TestKind::SpectrumRatio => "spectrum_ratio",
+            TestKind::CumulativeSpectrum => "cumulative_spectrum",
+        }
+    }
+
+    /// Whether it is slow drift that it looks at.
+    pub fn is_of_drift(self) -> bool {
+        matches!(self, TestKind::LowFrequency | TestKind::CumulativePeriodogram | TestKind::Start)
+    }
+}
+
 /// One test of one axis.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Test {
     pub axis: String,
-    /// "nis", "whiteness", "ljung_box", "low_frequency", "cumulative_periodogram", "start", "nees", …
+    #[serde(skip)]
+    pub kind: TestKind,
+    /// Of the kind, and of the measurement where there are several.
     pub name: String,
     pub statistic: f64,
     /// replay: the statistic lies in [lower, upper] with probability 1 − alpha when the design is true (each test alone);
@@ -73,11 +138,12 @@ pub struct Test {
 impl Test {
     /// A test not yet judged: `adjusted_p_value` is the p-value and it does not pass until [`multiplicity::judge`] or
     /// [`effect::judge`] has seen all tests of the document. Without a number for its statistic or its p-value it means nothing, and says so.
-    pub fn new(axis: &str, name: &str, statistic: f64, bounds: [f64; 2], p_value: f64, meaning: String) -> Test {
+    pub fn new(axis: &str, kind: TestKind, statistic: f64, bounds: [f64; 2], p_value: f64, meaning: String) -> Test {
         let meaning = if statistic.is_finite() && !p_value.is_nan() { meaning } else { NO_NUMBER.to_string() };
         Test {
             axis: axis.to_string(),
-            name: name.to_string(),
+            kind,
+            name: kind.name().to_string(),
             statistic,
             lower: bounds[0],
             upper: bounds[1],
@@ -88,6 +154,12 @@ impl Test {
             averaging_s: None,
             effect: None,
         }
+    }
+
+    #[must_use]
+    pub fn of_measurement(mut self, name: &str) -> Test {
+        self.name = format!("{} of {name}", self.kind.name());
+        self
     }
 
     /// Whether the design passes this test.

@@ -1,7 +1,7 @@
 //! Means of normalised squared errors against chi-square bounds: NEES across runs, NIS over time.
 
-use super::Test;
 use super::effect::{Effect, NIS_TOLERANCE};
+use super::{Test, TestKind};
 use crate::numerics::distribution::{chi_square_cdf, chi_square_quantile, chi_square_sf, normal_cdf, normal_quantile};
 
 /// A mean of normalised squares with its bounds under the model.
@@ -116,7 +116,7 @@ impl MeanTest {
     }
 
     /// The test record of a mean NEES.
-    pub fn nees(&self, axis: &str, name: &str) -> Test {
+    pub fn nees(&self, axis: &str) -> Test {
         let ratio = (self.mean / self.expected).sqrt();
         let meaning = match self.tendency() {
             "optimistic" => format!(
@@ -127,7 +127,7 @@ impl MeanTest {
             ),
             _ => "the estimation errors are as large as the covariance says".to_string(),
         };
-        Test::new(axis, name, self.mean, [self.lower, self.upper], self.p_value, meaning)
+        Test::new(axis, TestKind::Nees, self.mean, [self.lower, self.upper], self.p_value, meaning)
     }
 
     /// The test record of a mean NIS; `deviation_error` is the standard error of the mean estimated from the data themselves
@@ -145,11 +145,13 @@ impl MeanTest {
             ),
             _ => "the innovations are as large as the filter says".to_string(),
         };
-        Test::new(axis, "nis", self.mean, [self.lower, self.upper], self.p_value, meaning).with_effect(Effect::new(
-            "relative_nis_deviation",
-            deviation,
-            [deviation - half_width, deviation + half_width],
-            [-NIS_TOLERANCE, NIS_TOLERANCE],
-        ))
+        Test::new(axis, TestKind::Nis, self.mean, [self.lower, self.upper], self.p_value, meaning).with_effect(
+            Effect::new(
+                "relative_nis_deviation",
+                deviation,
+                [deviation - half_width, deviation + half_width],
+                [-NIS_TOLERANCE, NIS_TOLERANCE],
+            ),
+        )
     }
 }

@@ -1,7 +1,7 @@
 //! Is the innovation sequence white? Streaming autocorrelation, Ljung-Box, the largest lag, and Bartlett's cumulative periodogram.
 
-use super::Test;
 use super::effect::{AUTOCORRELATION_TOLERANCE, Effect, PERIODOGRAM_TOLERANCE, PREDICTABLE_TOLERANCE};
+use super::{Test, TestKind};
 use crate::numerics::distribution::{chi_square_quantile, chi_square_sf, kolmogorov_sf, normal_quantile, normal_sf};
 use crate::numerics::optimize::bracketed_root;
 use crate::signal::spectrum::periodogram;
@@ -216,7 +216,7 @@ impl Whiteness {
         };
         let largest = Test::new(
             axis,
-            "whiteness",
+            TestKind::Whiteness,
             self.largest_normalised,
             [0.0, self.largest_bound],
             self.largest_p_value,
@@ -242,7 +242,7 @@ impl Whiteness {
         };
         let together = Test::new(
             axis,
-            "ljung_box",
+            TestKind::LjungBox,
             self.ljung_box,
             [self.ljung_box_lower, self.ljung_box_upper],
             self.ljung_box_p_value,
@@ -353,14 +353,21 @@ impl CumulativePeriodogram {
             )
         };
         let size = self.distance.abs();
-        Test::new(axis, "cumulative_periodogram", self.distance, [-self.bound, self.bound], self.p_value, meaning)
-            .with_averaging(interval_s)
-            .with_effect(Effect::new(
-                "periodogram_distance",
-                size,
-                [(size - self.bound).max(0.0), size + self.bound],
-                [0.0, PERIODOGRAM_TOLERANCE],
-            ))
+        Test::new(
+            axis,
+            TestKind::CumulativePeriodogram,
+            self.distance,
+            [-self.bound, self.bound],
+            self.p_value,
+            meaning,
+        )
+        .with_averaging(interval_s)
+        .with_effect(Effect::new(
+            "periodogram_distance",
+            size,
+            [(size - self.bound).max(0.0), size + self.bound],
+            [0.0, PERIODOGRAM_TOLERANCE],
+        ))
     }
 }
 

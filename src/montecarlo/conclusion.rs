@@ -188,7 +188,9 @@ impl<'a> Summary<'a> {
                 (value, bounds, sentences::low_frequency(value, bounds, seconds))
             }
         };
-        let test = Test::new(&self.axis.name, &test_name(self.axis, kind), statistic, bounds, p, meaning);
+        let test = Test::new(&self.axis.name, kind.of_test(), statistic, bounds, p, meaning);
+        let measurement = kind.channel().filter(|_| self.axis.channels.len() > 1);
+        let test = measurement.map_or(test.clone(), |c| test.of_measurement(&self.axis.channels[c].name));
         averaging.into_iter().fold(test, Test::with_averaging)
     }
 

@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::course::AxisCourse;
 use super::sums::Channel;
+use crate::consistency::TestKind;
 use crate::consistency::normalized::two_sided_p;
 use crate::numerics::distribution::{chi_square_sf, kolmogorov_sf, normal_quantile, normal_sf};
 use crate::numerics::linalg::symmetric_eigenvalues;
@@ -64,19 +65,24 @@ impl Kind {
         kinds
     }
 
+    /// Without the measurement.
+    pub fn of_test(self) -> TestKind {
+        match self {
+            Kind::Nees => TestKind::Nees,
+            Kind::NeesAverage => TestKind::NeesAverage,
+            Kind::MeanError => TestKind::MeanError,
+            Kind::Nis(_) => TestKind::Nis,
+            Kind::InnovationMean(_) => TestKind::InnovationMean,
+            Kind::Autocorrelation(_) => TestKind::Autocorrelation,
+            Kind::LjungBox(_) => TestKind::LjungBox,
+            Kind::CumulativePeriodogram(_) => TestKind::CumulativePeriodogram,
+            Kind::LowFrequency(_) => TestKind::LowFrequency,
+        }
+    }
+
     /// The name in documents, without the measurement.
     pub fn name(self) -> &'static str {
-        match self {
-            Kind::Nees => "nees",
-            Kind::NeesAverage => "nees_average",
-            Kind::MeanError => "mean_error",
-            Kind::Nis(_) => "nis",
-            Kind::InnovationMean(_) => "innovation_mean",
-            Kind::Autocorrelation(_) => "autocorrelation",
-            Kind::LjungBox(_) => "ljung_box",
-            Kind::CumulativePeriodogram(_) => "cumulative_periodogram",
-            Kind::LowFrequency(_) => "low_frequency",
-        }
+        self.of_test().name()
     }
 
     /// Whether the raw p-value is a least one of many, or rests on an approximation that the drawn law replaces.

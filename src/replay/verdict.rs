@@ -14,7 +14,7 @@ use super::{
 use crate::consistency::effect::{self, Effect};
 use crate::consistency::normalized::{gated_moments, moment_matched};
 use crate::consistency::whiteness::Whiteness;
-use crate::consistency::{Test, Verdict};
+use crate::consistency::{Test, TestKind, Verdict};
 use crate::filter::AxisDesign;
 use crate::numerics::distribution::{chi_square_cdf, chi_square_quantile, chi_square_sf, normal_quantile, normal_sf};
 use crate::units::digits;
@@ -261,7 +261,7 @@ fn start_test(axis: &str, score: f64, information: f64, alpha: f64) -> (Start, T
     } else {
         "the log starts where x0 and P0 say".to_string()
     };
-    (Start { sigmas, p_value }, Test::new(axis, "start", z, [-bound, bound], p_value, meaning))
+    (Start { sigmas, p_value }, Test::new(axis, TestKind::Start, z, [-bound, bound], p_value, meaning))
 }
 
 /// Number of rejected samples against the Poisson law of a true design (which is conservative beside the binomial).
@@ -284,14 +284,13 @@ fn rejected_test(axis: &str, gate: f64, rejected: u64, accepted: u64, alpha: f64
         digits(expected)
     );
     let p_value = (2.0 * more.min(fewer)).min(1.0);
-    Test::new(axis, "rejected", share, [(normal - spread).max(0.0), normal + spread], p_value, meaning).with_effect(
-        Effect::new(
+    Test::new(axis, TestKind::Rejected, share, [(normal - spread).max(0.0), normal + spread], p_value, meaning)
+        .with_effect(Effect::new(
             "rejected_share",
             share,
             [low / total, high / total],
             [(normal - REJECTED_TOLERANCE).max(0.0), normal + REJECTED_TOLERANCE],
-        ),
-    )
+        ))
 }
 
 /// The verdict in a few sentences, axis by axis.
@@ -334,8 +333,7 @@ fn longest(axis: &AxisResult) -> f64 {
 
 /// The low-frequency tests were made and none of them failed.
 fn drift_holds<'a>(axis: &AxisResult, mut tests: impl Iterator<Item = &'a Test>) -> bool {
-    !axis.low_frequency.is_empty()
-        && tests.all(|t| t.pass() || !matches!(t.name.as_str(), "low_frequency" | "cumulative_periodogram" | "start"))
+    !axis.low_frequency.is_empty() && tests.all(|t| t.pass() || !t.kind.is_of_drift())
 }
 
 fn slow_part(axis: &AxisResult) -> String {

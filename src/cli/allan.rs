@@ -255,12 +255,7 @@ fn notes(axis: &AxisCurve) {
 
 /// "white + gauss_markov".
 fn model_name(model: &NoiseModel) -> String {
-    let names: Vec<String> = model
-        .terms
-        .iter()
-        .filter_map(|term| serde_json::to_value(term.kind()).ok())
-        .filter_map(|kind| kind.as_str().map(String::from))
-        .collect();
+    let names: Vec<&str> = model.terms.iter().map(|term| term.kind().name()).collect();
     names.join(" + ")
 }
 

@@ -7,14 +7,14 @@
 
 use super::points::{Distance, Points};
 use super::selection::{FIT_LEVEL, PENALTY, Table, score, search};
-use super::shape::{Role, Shape, document_name, roles, short_name};
+use super::shape::Shape;
 use super::weighted_fit::{Fit, tolerated};
 use super::{
     Candidate, Identified, IdentifyError, LENGTHS_TO_TELL, ModelChoice, WIDEST_INTERVAL, bias, entry, usable,
     worth_recording,
 };
 use crate::allan::{self, AllanCurve, Deviation, TauGrid};
-use crate::noise::{Kind, NoiseModel, Term};
+use crate::noise::{Kind, NoiseModel, Role, Term};
 use crate::numerics::distribution::{NORMAL_90, NORMAL_95};
 use crate::numerics::optimize::{bisect, half_way};
 use crate::numerics::reduce::mean;
@@ -155,7 +155,7 @@ fn known_terms(fit: &Fit, rate: &[f64]) -> Vec<(Term, [Option<[f64; 2]>; 2])> {
     let mut index = 0;
     let mut known = Vec::new();
     for term in fit.model().terms {
-        let parameters = roles(term.kind()).len();
+        let parameters = term.kind().roles().len();
         let intervals: Vec<Option<[f64; 2]>> = (index..index + parameters).map(|j| interval(fit, j)).collect();
         index += parameters;
         if intervals.iter().all(Option::is_some) {
@@ -194,12 +194,12 @@ struct Words<'a> {
 impl Words<'_> {
     fn parameter_name(fit: &Fit, index: usize) -> String {
         let (kind, role) = fit.shape.roles()[index];
-        let name = document_name(kind);
+        let name = kind.name();
         match role {
             Role::CorrelationTime => format!("{name}.correlation_time"),
             Role::Frequency => format!("{name}.frequency"),
             Role::Shape => format!("{name}.shape"),
-            Role::Coefficient if roles(kind).len() > 1 => format!("{name}.std_dev"),
+            Role::Coefficient if kind.roles().len() > 1 => format!("{name}.std_dev"),
             Role::Coefficient => name.into(),
         }
     }
@@ -267,7 +267,7 @@ impl Words<'_> {
         for own in drifts.into_iter().filter(|k| chosen.shape.has(*k)) {
             for other in drifts.into_iter().filter(|k| !chosen.shape.has(*k)) {
                 let Some(fit) = table.get(&chosen.shape.without(own).with(other)) else { continue };
-                let new = found.iter().all(|f| f.term != document_name(other));
+                let new = found.iter().all(|f| f.term != other.name());
                 if new && fit.p_value() >= FIT_LEVEL && score(fit) < score(chosen) + CLOSE {
                     found.push(self.look_alike(chosen, own, fit, other));
                 }
@@ -288,11 +288,11 @@ impl Words<'_> {
         let inside = time < self.points.span_s();
         let at = if inside { format!(", correlation time about {} s", digits(time)) } else { String::new() };
         NotIdentified {
-            term: document_name(other).into(),
+            term: other.name().into(),
             reason: format!(
                 "{} in place of {} explains the curve about as well (score {} against {}{at}): the log does not tell them apart",
-                short_name(other),
-                short_name(own),
+                other.short_name(),
+                own.short_name(),
                 digits(score(fit)),
                 digits(score(chosen)),
             ),
@@ -310,7 +310,7 @@ impl Words<'_> {
         let unit = super::coefficient_unit(kind, self.display);
         let limit = largest_tolerated(self.points, fit, kind).map(|limit| Measured::from_si(limit, None, unit));
         vec![NotIdentified {
-            term: document_name(kind).into(),
+            term: kind.name().into(),
             reason: format!(
                 "no drift is seen above the white noise in {} s{}",
                 digits(self.points.span_s()),

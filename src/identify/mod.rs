@@ -77,7 +77,7 @@ impl ModelChoice {
         let kind = kinds.iter().find(|kind| !shape::in_allan_curve(**kind))?;
         Some(format!(
             "{} needs `method` likelihood: averages of the log do not show it apart from white noise",
-            shape::short_name(*kind)
+            kind.short_name()
         ))
     }
 }
@@ -273,7 +273,7 @@ pub fn parse_model(text: &str) -> Result<ModelChoice, IdentifyError> {
         return Ok(ModelChoice::Auto);
     }
     let failed = |message: String| IdentifyError { message: format!("`model` {text}: {message}") };
-    let known = || shape::KINDS.map(shape::short_name).join(", ");
+    let known = || Kind::ALL.map(Kind::short_name).join(", ");
     let mut kinds = Vec::new();
     let (mut average, mut order) = (None, None);
     for part in text.split('+').map(str::trim) {
@@ -292,9 +292,7 @@ pub fn parse_model(text: &str) -> Result<ModelChoice, IdentifyError> {
             }
             _ => part,
         };
-        let kind = shape::KINDS
-            .into_iter()
-            .find(|k| name == shape::short_name(*k) || name == shape::document_name(*k))
+        let kind = Kind::named(name)
             .ok_or_else(|| failed(format!("unknown term '{part}'; known are {} (joined by +), or auto", known())))?;
         if !matches!(kind, Kind::GaussMarkov | Kind::Oscillation) && kinds.contains(&kind) {
             return Err(failed(match kind {
@@ -343,13 +341,7 @@ fn usable(name: &str, rate: &[f64]) -> Result<(), IdentifyError> {
 
 /// The unit of a term's coefficient in the family of the log's unit.
 fn coefficient_unit(kind: Kind, display: &Unit) -> Unit {
-    display.times_time(match kind {
-        Kind::Quantization => 2,
-        Kind::White | Kind::MovingAverage | Kind::BandLimit => 1,
-        Kind::Oscillation | Kind::BiasInstability | Kind::GaussMarkov => 0,
-        Kind::RateRandomWalk => -1,
-        Kind::RateRamp => -2,
-    })
+    display.times_time(kind.half_seconds())
 }
 
 /// Of a random walk that was not seen.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use super::points::Points;
-use super::shape::{KINDS, Shape, in_allan_curve};
+use super::shape::{Shape, in_allan_curve};
 use super::weighted_fit::{Fit, fit};
 use crate::noise::Kind;
 
@@ -93,7 +93,7 @@ fn neighbours(shape: &Shape) -> Vec<Shape> {
         Kind::GaussMarkov => shape.count(kind) < MOST_GAUSS_MARKOV,
         kind => !shape.has(kind),
     };
-    let kinds = || KINDS.into_iter().filter(|k| in_allan_curve(*k));
+    let kinds = || Kind::ALL.into_iter().filter(|k| in_allan_curve(*k));
     let mut found: Vec<Shape> = kinds().filter(|k| may_add(shape, *k)).map(|k| shape.with(k)).collect();
     for kind in shape.kinds().iter().filter(|k| **k != Kind::White) {
         let fewer = shape.without(*kind);

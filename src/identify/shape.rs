@@ -1,6 +1,6 @@
 //! Which terms a model has, and its parameters as logarithms.
 
-use crate::noise::{Kind, NoiseModel, Term};
+use crate::noise::{Kind, NoiseModel, Role, Term};
 
 /// A list of kinds in the order of [`Kind`]; only Gauss-Markov and oscillation may stand more than once.
 ///
@@ -9,18 +9,6 @@ use crate::noise::{Kind, NoiseModel, Term};
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Shape {
     kinds: Vec<Kind>,
-}
-
-/// What one parameter is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Role {
-    /// Enters the Allan variance as its square.
-    Coefficient,
-    /// Of a filter: an area ratio, no unit.
-    Shape,
-    /// Hz.
-    Frequency,
-    CorrelationTime,
 }
 
 impl Shape {
@@ -50,7 +38,7 @@ impl Shape {
     }
     /// Kind and role of every parameter.
     pub(super) fn roles(&self) -> Vec<(Kind, Role)> {
-        self.kinds.iter().flat_map(|kind| roles(*kind).iter().map(|role| (*kind, *role))).collect()
+        self.kinds.iter().flat_map(|kind| kind.roles().iter().map(|role| (*kind, *role))).collect()
     }
     pub(super) fn parameters(&self) -> usize {
         self.roles().len()
@@ -70,16 +58,7 @@ impl Shape {
     pub(super) fn label(&self) -> String {
         let mut kinds = self.kinds.clone();
         kinds.sort_by_key(|k| (*k != Kind::White, *k));
-        kinds.iter().map(|k| short_name(*k)).collect::<Vec<_>>().join("+")
-    }
-}
-
-/// What the parameters of a term are, in the order of [`Term`].
-pub(super) fn roles(kind: Kind) -> &'static [Role] {
-    match kind {
-        Kind::GaussMarkov => &[Role::Coefficient, Role::CorrelationTime],
-        Kind::Oscillation => &[Role::Coefficient, Role::Frequency, Role::CorrelationTime],
-        _ => &[Role::Coefficient],
+        kinds.iter().map(|k| k.short_name()).collect::<Vec<_>>().join("+")
     }
 }
 
@@ -99,49 +78,6 @@ pub(super) fn one_coefficient(kind: Kind, value: f64) -> Term {
         Kind::RateRamp => Term::RateRamp { slope: value },
     }
 }
-
-/// The name in `--model`.
-pub(super) fn short_name(kind: Kind) -> &'static str {
-    match kind {
-        Kind::Quantization => "quantization",
-        Kind::White => "white",
-        Kind::MovingAverage => "ma",
-        Kind::BandLimit => "bl",
-        Kind::Oscillation => "osc",
-        Kind::BiasInstability => "flicker",
-        Kind::GaussMarkov => "gm",
-        Kind::RateRandomWalk => "rrw",
-        Kind::RateRamp => "ramp",
-    }
-}
-
-/// The name in params.json.
-pub(super) fn document_name(kind: Kind) -> &'static str {
-    match kind {
-        Kind::Quantization => "quantization",
-        Kind::White => "white",
-        Kind::MovingAverage => "moving_average",
-        Kind::BandLimit => "band_limit",
-        Kind::Oscillation => "oscillation",
-        Kind::BiasInstability => "bias_instability",
-        Kind::GaussMarkov => "gauss_markov",
-        Kind::RateRandomWalk => "rate_random_walk",
-        Kind::RateRamp => "rate_ramp",
-    }
-}
-
-/// All kinds, in the fixed order.
-pub(super) const KINDS: [Kind; 9] = [
-    Kind::Quantization,
-    Kind::White,
-    Kind::MovingAverage,
-    Kind::BandLimit,
-    Kind::Oscillation,
-    Kind::BiasInstability,
-    Kind::GaussMarkov,
-    Kind::RateRandomWalk,
-    Kind::RateRamp,
-];
 
 /// The kinds that show in an Allan curve: it averages a narrow line away, and averages and band limits are white but for the shortest times.
 pub(super) fn in_allan_curve(kind: Kind) -> bool {

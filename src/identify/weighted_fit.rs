@@ -22,8 +22,8 @@ use nalgebra::{DMatrix, DVector};
 use statrs::function::gamma::ln_gamma;
 
 use super::points::{Covariance, Distance, Points};
-use super::shape::{Role, Shape, one_coefficient};
-use crate::noise::{Kind, NoiseModel, Term};
+use super::shape::{Shape, one_coefficient};
+use crate::noise::{Kind, NoiseModel, Role, Term};
 use crate::numerics::distribution::chi_square_sf;
 use crate::numerics::linalg::cholesky;
 use crate::numerics::optimize::{Look, Optimum, Problem, minimize};

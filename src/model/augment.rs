@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::plant::{self, Plant};
 use super::{DRIFT, LinearModel, ModelError, Named, Output};
-use crate::noise::{NoiseModel, Realisation, Term};
+use crate::noise::{Kind, NoiseModel, Realisation, Term};
 use crate::units::Quantity;
 
 /// What is known of the constant bias before the first measurement (SI, unit of the quantity).
@@ -287,7 +287,7 @@ fn unit(name: &str, quantity: Quantity) -> &'static str {
         Quantity::SpecificForce => ("m/s", quantity.si_unit(), "m/s^3"),
     };
     match name {
-        _ if name.starts_with("quantization") => integral,
+        _ if Kind::of_state(name) == Some(Kind::Quantization) => integral,
         _ if name.contains("slope") => slope,
         _ => itself,
     }

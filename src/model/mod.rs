@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::noise::TooFast;
+use crate::noise::{Kind, TooFast};
 use crate::numerics::linalg::{cholesky, cholesky_semidefinite, relative_to_diagonal};
 
 pub use augment::{Attached, Augmented, InitialBias, Port, aid_errors, augment, sensor_errors};
@@ -84,8 +84,7 @@ impl LinearModel {
         if let Some(output) = self.outputs.iter().find(|output| output.name == DRIFT) {
             return DMatrix::from_row_slice(1, output.row.len(), &output.row);
         }
-        let kinds = ["quantization", "moving_average", "band_limit", "oscillation"];
-        let noise = |j: usize| kinds.iter().any(|kind| self.states[j].name.starts_with(kind));
+        let noise = |j: usize| Kind::of_state(&self.states[j].name).is_some_and(|kind| !kind.is_drift());
         DMatrix::from_fn(1, self.states.len(), |_, j| if noise(j) { 0.0 } else { self.h[(0, j)] })
     }
 

@@ -8,6 +8,7 @@ mod band_limit;
 mod bias_instability;
 mod gauss_markov;
 mod grid;
+mod kind;
 mod moving_average;
 mod oscillation;
 mod quantization;
@@ -19,10 +20,9 @@ mod white;
 
 pub use band_limit::{Filter, FilterError, HIGHEST_ORDER};
 pub use grid::Grid;
+pub use kind::{Kind, Role};
 use nalgebra::{DMatrix, RowDVector};
 use rand::rngs::ChaCha8Rng;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 use crate::units::digits;
 
@@ -31,31 +31,6 @@ pub const FLICKER_FLOOR: f64 = 0.664_282_470_267_96;
 /// Maximum of the Allan deviation of a Gauss-Markov process over its σ, at τ = 1.892617833 Tc: the maximum of
 /// √((2/x)(1 − (3 − 4e^(−x) + e^(−2x))/2x)).
 pub const GAUSS_MARKOV_PEAK: f64 = 0.617_364_283_144_44;
-
-/// The kinds of term, in the fixed order used everywhere (documents, tables, random streams).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Kind {
-    Quantization,
-    White,
-    MovingAverage,
-    BandLimit,
-    Oscillation,
-    BiasInstability,
-    GaussMarkov,
-    RateRandomWalk,
-    RateRamp,
-}
-
-impl Kind {
-    /// Drift of the bias, which a filter estimates and takes off; else noise of the measurement, whatever states it needs.
-    pub fn is_drift(self) -> bool {
-        match self {
-            Kind::Quantization | Kind::White | Kind::MovingAverage | Kind::BandLimit | Kind::Oscillation => false,
-            Kind::BiasInstability | Kind::GaussMarkov | Kind::RateRandomWalk | Kind::RateRamp => true,
-        }
-    }
-}
 
 /// One noise process with SI coefficients.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,20 +3,8 @@
 use super::measured::Range;
 use super::place::{KeyError, Object, Place};
 use super::{AxisParams, Measured, NotIdentified, TemperatureEffect, TermEntry};
-use crate::noise::Filter;
+use crate::noise::{Filter, Kind};
 use crate::units::{Dimension, Quantity, Unit};
-
-const TERM_KEYS: [&str; 9] = [
-    "quantization",
-    "white",
-    "moving_average",
-    "band_limit",
-    "oscillation",
-    "bias_instability",
-    "gauss_markov",
-    "rate_random_walk",
-    "rate_ramp",
-];
 
 /// A longer average is a filter that a log at a lower rate would show as well; each sample is a state.
 const LONGEST_AVERAGE: u64 = 64;
@@ -27,7 +15,7 @@ const MOST_TERMS: usize = 24;
 
 pub(super) fn axis(place: &Place<'_>, quantity: Quantity) -> Result<AxisParams, KeyError> {
     let mut known = vec!["name", "bias", "turn_on_bias", "temperature"];
-    known.extend(TERM_KEYS);
+    known.extend(Kind::ALL.map(Kind::name));
     known.push("not_identified");
     let object = place.object(&known)?;
     let name = object.required("name")?;
@@ -37,8 +25,8 @@ pub(super) fn axis(place: &Place<'_>, quantity: Quantity) -> Result<AxisParams, 
     }
     let base = quantity.dimension();
     let mut terms = Vec::new();
-    for key in TERM_KEYS {
-        let Some(place) = object.optional(key) else { continue };
+    for kind in Kind::ALL {
+        let Some(place) = object.optional(kind.name()) else { continue };
         for item in place.one_or_many()? {
             if terms.len() == MOST_TERMS {
                 return Err(item.error(format!(
@@ -46,7 +34,7 @@ pub(super) fn axis(place: &Place<'_>, quantity: Quantity) -> Result<AxisParams, 
                      time or frequency"
                 )));
             }
-            terms.push(term(key, &item, base)?);
+            terms.push(term(kind, &item, base)?);
         }
     }
     let turn_on_bias =
@@ -75,13 +63,15 @@ fn temperature(place: &Place<'_>, base: Dimension) -> Result<TemperatureEffect, 
     })
 }
 
-fn term(key: &str, place: &Place<'_>, base: Dimension) -> Result<TermEntry, KeyError> {
-    Ok(match key {
-        "quantization" => TermEntry::Quantization {
+fn term(kind: Kind, place: &Place<'_>, base: Dimension) -> Result<TermEntry, KeyError> {
+    Ok(match kind {
+        Kind::Quantization => TermEntry::Quantization {
             coefficient: positive(&place.object(&["coefficient"])?, "coefficient", base.times_time(2))?,
         },
-        "white" => TermEntry::White { density: positive(&place.object(&["density"])?, "density", base.times_time(1))? },
-        "moving_average" => {
+        Kind::White => {
+            TermEntry::White { density: positive(&place.object(&["density"])?, "density", base.times_time(1))? }
+        }
+        Kind::MovingAverage => {
             let object = place.object(&["density", "samples"])?;
             let samples = object.required("samples")?;
             let count = samples.count()?;
@@ -94,7 +84,7 @@ fn term(key: &str, place: &Place<'_>, base: Dimension) -> Result<TermEntry, KeyE
                 samples: count as u32,
             }
         }
-        "band_limit" => {
+        Kind::BandLimit => {
             let object = place.object(&["density", "numerator", "denominator"])?;
             let numbers = |key: &str| -> Result<Vec<f64>, KeyError> {
                 object.required(key)?.list()?.iter().map(Place::number).collect()
@@ -105,7 +95,7 @@ fn term(key: &str, place: &Place<'_>, base: Dimension) -> Result<TermEntry, KeyE
                 filter: filter.or_else(|e| Err(object.required(e.name())?.error(e.to_string())))?,
             }
         }
-        "oscillation" => {
+        Kind::Oscillation => {
             let object = place.object(&["std_dev", "frequency", "correlation_time"])?;
             TermEntry::Oscillation {
                 std_dev: positive(&object, "std_dev", base)?,
@@ -113,20 +103,20 @@ fn term(key: &str, place: &Place<'_>, base: Dimension) -> Result<TermEntry, KeyE
                 correlation_time: positive(&object, "correlation_time", Dimension::TIME)?,
             }
         }
-        "bias_instability" => {
+        Kind::BiasInstability => {
             TermEntry::BiasInstability { coefficient: positive(&place.object(&["coefficient"])?, "coefficient", base)? }
         }
-        "gauss_markov" => {
+        Kind::GaussMarkov => {
             let object = place.object(&["std_dev", "correlation_time"])?;
             TermEntry::GaussMarkov {
                 std_dev: positive(&object, "std_dev", base)?,
                 correlation_time: positive(&object, "correlation_time", Dimension::TIME)?,
             }
         }
-        "rate_random_walk" => TermEntry::RateRandomWalk {
+        Kind::RateRandomWalk => TermEntry::RateRandomWalk {
             density: positive(&place.object(&["density"])?, "density", base.times_time(-1))?,
         },
-        _ => {
+        Kind::RateRamp => {
             let slope = place.object(&["slope"])?.required("slope")?;
             TermEntry::RateRamp { slope: Measured::from_place(&slope, base.times_time(-2), Range::Any)? }
         }

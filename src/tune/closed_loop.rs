@@ -10,6 +10,7 @@ use crate::filter::Kalman;
 use crate::filter::steady_state::{SteadyState, SteadyStateError, steady_state};
 use crate::model::observability::undriven_states;
 use crate::model::{DRIFT, LinearModel};
+use crate::noise::Kind;
 use crate::numerics::linalg::{LinalgError, symmetrise};
 use crate::numerics::optimize::bracketed_root;
 use crate::numerics::riccati::lyapunov;
@@ -39,13 +40,13 @@ fn part(a: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
 
 /// The noise term that drives a state; of an aid with its name before it.
 fn source(state: &str) -> String {
-    let kinds = ["bias_instability", "moving_average", "band_limit", "quantization", "rate_ramp"];
     if state == "bias" || state.ends_with(".bias") {
         return state.replace("bias", "rate_random_walk");
     }
-    let sensor = |at: usize| state[..at].is_empty() || state[..at].ends_with('.');
-    match kinds.iter().find_map(|kind| Some((state.find(kind).filter(|at| sensor(*at))?, kind))) {
-        Some((at, kind)) => format!("{}{kind}", &state[..at]),
+    // of these kinds all states of one term together
+    let together = |kind: &Kind| kind.has_joint_states() || matches!(kind, Kind::Quantization | Kind::RateRamp);
+    match Kind::of_state(state).filter(together) {
+        Some(kind) => state.find(kind.name()).map_or(state.into(), |at| format!("{}{}", &state[..at], kind.name())),
         None => state.replace(".quadrature", ""),
     }
 }

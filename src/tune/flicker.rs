@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::model::LinearModel;
-use crate::noise::{NoiseModel, Term};
+use crate::noise::{Kind, NoiseModel, Term};
 
 /// Flicker (bias instability) as the filter has it.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -37,8 +37,9 @@ pub(super) fn simplify(
     noise: &NoiseModel,
     horizon_s: f64,
 ) -> (LinearModel, Option<FlickerApproximation>) {
-    let mut chain: Vec<usize> =
-        (0..model.states.len()).filter(|&i| model.states[i].name.starts_with("bias_instability")).collect();
+    let mut chain: Vec<usize> = (0..model.states.len())
+        .filter(|&i| Kind::of_state(&model.states[i].name) == Some(Kind::BiasInstability))
+        .collect();
     if chain.is_empty() {
         return (model, None);
     }

@@ -73,8 +73,12 @@ pub(super) fn drift_sigma(model: &LinearModel, p: &DMatrix<f64>) -> f64 {
 /// What the measurements can tell, without a sentence for each state that only stands for flicker together with others.
 pub(super) fn observability_sentences(model: &LinearModel) -> Result<Vec<String>, LinalgError> {
     let mut sentences = observability(model)?.sentences;
-    let chain: Vec<&str> =
-        model.states.iter().map(|s| s.name.as_str()).filter(|n| n.starts_with("bias_instability")).collect();
+    let chain: Vec<&str> = model
+        .states
+        .iter()
+        .map(|s| s.name.as_str())
+        .filter(|n| Kind::of_state(n) == Some(Kind::BiasInstability))
+        .collect();
     if let [parts @ .., _slowest] = chain.as_slice() {
         sentences.retain(|s| !parts.iter().any(|name| s.contains(&format!("{name} (correlation"))));
     }
@@ -107,7 +111,7 @@ fn merged(noise: &NoiseModel, warnings: &mut Vec<String>) -> NoiseModel {
         let partner = terms.iter_mut().find_map(|earlier| Some((together(earlier, term)?, earlier)));
         if let Some((sum, earlier)) = partner {
             *earlier = sum;
-            let name = name(term.kind());
+            let name = term.kind().name();
             warnings.push(format!("two {name} terms of the same dynamics are one state: their variances are added"));
         } else {
             terms.push(*term);
@@ -150,20 +154,6 @@ fn together(a: &Term, b: &Term) -> Option<Term> {
             Term::GaussMarkov { std_dev: y, correlation_time: other },
         ) if same(correlation_time, other) => Some(Term::GaussMarkov { std_dev: x.hypot(y), correlation_time }),
         _ => None,
-    }
-}
-
-fn name(kind: Kind) -> &'static str {
-    match kind {
-        Kind::Quantization => "quantization",
-        Kind::White => "white",
-        Kind::MovingAverage => "moving_average",
-        Kind::BandLimit => "band_limit",
-        Kind::Oscillation => "oscillation",
-        Kind::BiasInstability => "bias_instability",
-        Kind::GaussMarkov => "gauss_markov",
-        Kind::RateRandomWalk => "rate_random_walk",
-        Kind::RateRamp => "rate_ramp",
     }
 }
 

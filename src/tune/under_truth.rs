@@ -11,6 +11,7 @@ use crate::filter::gains::GainSequence;
 use crate::filter::judge::Judge;
 use crate::filter::mismatch::{Expectation, ExpectedError, ExpectedInnovations, expect};
 use crate::model::{DRIFT, LinearModel, Named};
+use crate::noise::Kind;
 use crate::params::Params;
 use crate::units::digits;
 
@@ -222,7 +223,7 @@ fn conclusion(result: &UnderTruth) -> (Tendency, String) {
         let known = |(&real, &claimed): (&f64, &f64)| if real == claimed { 1.0 } else { real / claimed };
         error.real.iter().zip(&error.claimed).map(known).collect()
     };
-    let told = result.states.iter().filter(|s| !s.name.starts_with("bias_instability"));
+    let told = result.states.iter().filter(|s| Kind::of_state(&s.name) != Some(Kind::BiasInstability));
     let errors = told.map(|s| (s.name.as_str(), s)).chain([("the whole drift", &result.drift)]);
     let mut all = vec![Ratio { error: None, ratio: result.nis.sqrt() }];
     for (name, error) in errors {

@@ -11,7 +11,6 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::super::shape::Role;
 use super::super::tails::widened;
 use super::names::name_of;
 use super::ordinates::Ordinates;
@@ -19,7 +18,7 @@ use super::sums::{Sum, counts_as_white, growth};
 use super::whittle::{self, Fit};
 use super::{Fitted, Identified, interval};
 use crate::identify::FEWEST_SAMPLES;
-use crate::noise::{Kind, NoiseModel, Term};
+use crate::noise::{Kind, NoiseModel, Role, Term};
 use crate::numerics::distribution::{NORMAL_95, chi_square_quantile, chi_square_sf, student_quantile};
 use crate::numerics::optimize::{bracketed_root, lowest};
 use crate::params::AxisParams;

@@ -11,14 +11,13 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::super::shape::Role;
 use super::form::Form;
 use super::names::{name_of, unit_of};
 use super::ordinates::Ordinates;
 use super::sums::counts_as_white;
 use super::whittle;
 use crate::identify::FEWEST_SAMPLES;
-use crate::noise::{Filter, Kind, NoiseModel, Term};
+use crate::noise::{Filter, Kind, NoiseModel, Role, Term};
 use crate::signal::lines::Line;
 use crate::units::Unit;
 

@@ -2,8 +2,7 @@
 
 use std::ops::Range;
 
-use super::super::shape::{Role, roles};
-use crate::noise::{Filter, HIGHEST_ORDER, Kind, NoiseModel, Term};
+use crate::noise::{Filter, HIGHEST_ORDER, Kind, NoiseModel, Role, Term};
 
 /// White noise beside a band limit whose shape is searched, variance over that of its innovations. An ARMA(p, p) process holds any white noise in itself, so that
 /// none of its own can be told; a filter needs some measurement noise. Little, since nothing is left at half the sample rate of what no converter has followed; but not so
@@ -43,7 +42,7 @@ impl Piece {
         match self {
             Piece::Ramp => &[],
             Piece::BandLimit(order) => &BAND_LIMIT[..=2 * usize::from(order)],
-            piece => roles(piece.kind()),
+            piece => piece.kind().roles(),
         }
     }
 
@@ -120,7 +119,7 @@ impl Piece {
         match self {
             Piece::MovingAverage(samples) => format!("ma{samples}"),
             Piece::BandLimit(order) => format!("bl{order}"),
-            piece => super::super::shape::short_name(piece.kind()).to_string(),
+            piece => piece.kind().short_name().to_string(),
         }
     }
 }

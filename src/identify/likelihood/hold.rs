@@ -7,14 +7,13 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::super::shape::Role;
 use super::interval::{Precision, precisions};
 use super::names::parameter_name;
 use super::ordinates::Ordinates;
 use super::whittle::Fit;
 use super::{Candidates, Fitted, IdentifyError, refine};
 use crate::filter::likelihood::Stretch;
-use crate::noise::Kind;
+use crate::noise::{Kind, Role};
 use crate::numerics::distribution::chi_square_sf;
 use crate::units::{Unit, digits};
 

@@ -3,11 +3,10 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::super::shape::Role;
 use super::form::{Form, Piece};
 use super::ordinates::Ordinates;
 use super::whittle::{self, Fit};
-use crate::noise::Kind;
+use crate::noise::{Kind, Role};
 use crate::numerics::distribution::{NORMAL_90, NORMAL_95, NORMAL_99};
 use crate::numerics::optimize::covariance;
 

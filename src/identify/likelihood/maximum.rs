@@ -1,13 +1,12 @@
 //! The maximum of the exact likelihood alone.
 
 use super::super::FEWEST_SAMPLES;
-use super::super::shape::Role;
 use super::exact::Exact;
 use super::form::Form;
 use super::ordinates::Ordinates;
 use super::whittle::STEEPEST;
 use crate::filter::likelihood::Stretch;
-use crate::noise::{Grid, Kind, NoiseModel};
+use crate::noise::{Grid, Kind, NoiseModel, Role};
 
 /// Longest correlation time that a maximum is looked for at, in lengths of the log.
 const FURTHEST: f64 = 100.0;

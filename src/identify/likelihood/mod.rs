@@ -26,12 +26,11 @@ mod words;
 
 use rayon::prelude::*;
 
-use super::shape::Role;
 use super::{Candidate, Identified, IdentifyError, ModelChoice, Precision as Known, bias, entry, usable};
 use crate::allan::{self, AllanCurve, Deviation, Pooled, TauGrid, deviation};
 use crate::consistency::spectrum::{Departure, departure};
 use crate::filter::likelihood::{LogLikelihood, Stretch};
-use crate::noise::{Kind, NoiseModel, Term};
+use crate::noise::{Kind, NoiseModel, Role, Term};
 use crate::numerics::distribution::NORMAL_95;
 use crate::numerics::reduce::mean;
 use crate::params::AxisParams;
@@ -503,7 +502,7 @@ fn known_precision(terms: &[Found]) -> Vec<Known> {
     for (i, found) in terms.iter().enumerate() {
         let kind = found.term.kind();
         let number = terms[..i].iter().filter(|other| other.term.kind() == kind).count();
-        let names = super::shape::roles(kind).iter().map(|role| parameter_name(kind, number, *role));
+        let names = kind.roles().iter().map(|role| parameter_name(kind, number, *role));
         all.extend(names.zip(&found.precision).map(|(parameter, [sigma, bound])| Known {
             parameter,
             std_dev_percent: 100.0 * sigma,

@@ -1,8 +1,7 @@
 //! Names and units of parameters.
 
-use super::super::shape::{Role, document_name};
 use super::form::Form;
-use crate::noise::Kind;
+use crate::noise::{Kind, Role};
 use crate::units::Unit;
 
 /// Of a logarithm: its name in params.json.
@@ -20,27 +19,18 @@ pub(super) fn unit_of(form: &Form, index: usize, display: &Unit) -> Unit {
         Role::CorrelationTime => Unit::second(),
         Role::Frequency => Unit::hertz(),
         Role::Shape => Unit::one(),
-        Role::Coefficient => super::super::coefficient_unit(form.pieces()[piece].kind(), display),
+        Role::Coefficient => display.times_time(form.pieces()[piece].kind().half_seconds()),
     }
 }
 
 /// `gauss_markov[1]`.
 pub(super) fn term_name(kind: Kind, number: usize) -> String {
-    if number == 0 { document_name(kind).to_string() } else { format!("{}[{number}]", document_name(kind)) }
+    if number == 0 { kind.name().to_string() } else { format!("{}[{number}]", kind.name()) }
 }
 
 /// `gauss_markov[1].std_dev`.
 pub(super) fn parameter_name(kind: Kind, number: usize, role: Role) -> String {
     let place = term_name(kind, number);
-    match role {
-        Role::CorrelationTime => format!("{place}.correlation_time"),
-        Role::Frequency => format!("{place}.frequency"),
-        Role::Shape => format!("{place}.shape"),
-        Role::Coefficient => match kind {
-            Kind::GaussMarkov | Kind::Oscillation => format!("{place}.std_dev"),
-            Kind::White | Kind::MovingAverage | Kind::BandLimit | Kind::RateRandomWalk => format!("{place}.density"),
-            Kind::RateRamp => format!("{place}.slope"),
-            Kind::Quantization | Kind::BiasInstability => format!("{place}.coefficient"),
-        },
-    }
+    let index = kind.roles().iter().position(|other| *other == role);
+    format!("{place}.{}", index.map_or("shape", |index| kind.parameters()[index]))
 }

@@ -9,12 +9,11 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::super::shape::Role;
 use super::form::Form;
 use super::names::name_of;
 use super::ordinates::Ordinates;
 use super::{parameter_name, whittle};
-use crate::noise::{Grid, Kind, NoiseModel, Term};
+use crate::noise::{Grid, Kind, NoiseModel, Role, Term};
 use crate::numerics::optimize::covariance;
 use crate::signal::lines::Line;
 
@@ -94,7 +93,7 @@ impl Planned {
         for (i, term) in model.terms.iter().enumerate() {
             let kind = term.kind();
             let number = model.terms[..i].iter().filter(|other| other.kind() == kind).count();
-            let names = super::super::shape::roles(kind).iter().map(|role| parameter_name(kind, number, *role));
+            let names = kind.roles().iter().map(|role| parameter_name(kind, number, *role));
             match *term {
                 Term::RateRamp { slope } => parameters.extend(names.map(|name| (name, Origin::Slope(slope)))),
                 _ => parameters.extend(

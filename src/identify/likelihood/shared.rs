@@ -5,10 +5,9 @@ use std::convert::Infallible;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::super::shape::Role;
 use super::ordinates::Ordinates;
 use super::whittle::{self, Fit};
-use crate::noise::Kind;
+use crate::noise::{Kind, Role};
 use crate::numerics::distribution::{NORMAL_95, chi_square_sf};
 use crate::numerics::optimize::{bisect, half_way, lowest};
 

@@ -18,14 +18,13 @@
 use rayon::prelude::*;
 
 use super::super::coefficient_unit;
-use super::super::shape::Role;
 use super::interval::{Precision, precisions};
 use super::ordinates::Ordinates;
 use super::whittle::{self, Fit};
 use super::{Fitted, exact, name_of, parameter_name, refine, turn_on, unit_of};
 use crate::filter::likelihood::{LogLikelihood, Stretch, diffuse_log_likelihood};
 use crate::model::LinearModel;
-use crate::noise::Kind;
+use crate::noise::{Kind, Role};
 use crate::numerics::distribution::{NORMAL_95, chi_square_sf};
 use crate::numerics::reduce::mean;
 use crate::params::Measured;

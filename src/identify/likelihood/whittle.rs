@@ -8,10 +8,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::super::shape::Role;
 use super::form::{Form, Piece};
 use super::ordinates::Ordinates;
-use crate::noise::{Kind, Term};
+use crate::noise::{Kind, Role, Term};
 use crate::numerics::optimize::{Look, Optimum, Problem, minimize};
 use crate::numerics::progress::checkpoint;
 

@@ -1,7 +1,6 @@
 //! What is said of one axis beside the numbers: what its log does not tell, and warnings.
 
 use super::super::selection::FIT_LEVEL;
-use super::super::shape::{Role, document_name};
 use super::super::{LENGTHS_TO_TELL, WIDEST_INTERVAL, coefficient_unit, worth_recording, would_have_shown};
 use super::CLOSE;
 use super::form::Piece;
@@ -10,7 +9,7 @@ use super::interval::{Precision, processes, shortest};
 use super::names::{name_of, unit_of};
 use super::ordinates::Ordinates;
 use super::whittle::{self, Fit};
-use crate::noise::{Kind, Term};
+use crate::noise::{Kind, Role, Term};
 use crate::numerics::distribution::{NORMAL_90, NORMAL_95};
 use crate::numerics::optimize::bracketed_root;
 use crate::params::{Measured, NotIdentified};
@@ -99,7 +98,7 @@ impl Words<'_> {
             let new: Vec<Kind> = slow(fit).into_iter().filter(|k| !own.form.has(*k)).collect();
             let [kind] = new[..] else { continue };
             let worse = score(fit, self.data) - score(own, self.data);
-            if i == chosen || more || worse.abs() >= CLOSE || found.iter().any(|f| f.term == document_name(kind)) {
+            if i == chosen || more || worse.abs() >= CLOSE || found.iter().any(|f| f.term == kind.name()) {
                 continue;
             }
             let time = fit.form.roles().iter().position(|(piece, role)| {
@@ -113,7 +112,7 @@ impl Words<'_> {
                 (None, None) => String::new(),
             };
             found.push(NotIdentified {
-                term: document_name(kind).into(),
+                term: kind.name().into(),
                 reason: format!(
                     "{} explains the log about as well as {} (score {worse:+.2}{at}): the log does not tell them apart",
                     fit.form.label(),
@@ -135,7 +134,7 @@ impl Words<'_> {
         let unit = coefficient_unit(Kind::RateRandomWalk, self.display);
         let limit = self.largest_walk(fit).map(|density| Measured::from_si(density, None, unit));
         vec![NotIdentified {
-            term: document_name(Kind::RateRandomWalk).into(),
+            term: Kind::RateRandomWalk.name().into(),
             reason: format!(
                 "no drift is seen above the white noise in {} s{}",
                 digits(self.data.total_s()),

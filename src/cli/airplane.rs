@@ -5,12 +5,13 @@ use std::path::PathBuf;
 use super::Status;
 use super::files::{self, Kind};
 use super::flags::with_unit;
-use super::output::{digits, print_json, print_text, table};
+use super::output::{print_json, print_text};
 use crate::aircraft::airframe::Airplane;
 use crate::aircraft::airframe::check::{AirplaneCheck, SpeedPoint};
 use crate::export::atomic;
 use crate::report::figure::{self, Curve, Lines};
-use crate::units::Dimension;
+use crate::report::terminal::table;
+use crate::units::{Dimension, digits};
 
 /// What an airplane document says, and whether it makes sense
 #[derive(Debug, clap::Args)]

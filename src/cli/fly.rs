@@ -10,12 +10,13 @@ use anyhow::bail;
 use super::Status;
 use super::files::{self, Kind};
 use super::flags::{whole, with_unit};
-use super::output::{digits, print_json, print_text, table};
+use super::output::{print_json, print_text};
 use crate::aircraft::flight::{FlightDocument, FlightReport, Plan, RowSink, Times, fly};
 use crate::export::atomic;
 use crate::export::table::TableWriter;
 use crate::report::figure::Envelope;
-use crate::units::Dimension;
+use crate::report::terminal::table;
+use crate::units::{Dimension, digits};
 
 /// An airplane over time: truth and what its sensors show
 #[derive(Debug, clap::Args)]

@@ -2,7 +2,7 @@
 
 use clap::ValueEnum;
 
-use super::{Status, allan, identify, output, plan, simulate, tune};
+use super::{Status, allan, identify, output, tune};
 use crate::aircraft::airframe::AirplaneDocument;
 use crate::aircraft::airframe::check::AirplaneCheck;
 use crate::aircraft::control::document::LinearDocument;
@@ -11,11 +11,13 @@ use crate::compare::Comparison;
 use crate::compare::designs::Ranking;
 use crate::compare::inflation::Inflation;
 use crate::filter::{AttitudeDesign, FilterDesign};
+use crate::identify::log_plan::LogPlan;
 use crate::input::inspect::Inventory;
 use crate::montecarlo;
 use crate::params::Params;
 use crate::replay::ReplayResult;
 use crate::replay::attitude::AttitudeReplay;
+use crate::simulate::Summary;
 
 /// The JSON schema of a document
 #[derive(Debug, clap::Args)]
@@ -89,8 +91,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         Document::Info => schemars::schema_for!(Inventory).to_value(),
         Document::Allan => schemars::schema_for!(allan::Document).to_value(),
         Document::Identify => schemars::schema_for!(identify::Document<'_>).to_value(),
-        Document::Plan => schemars::schema_for!(plan::Document<'_>).to_value(),
-        Document::Simulation => schemars::schema_for!(simulate::Summary).to_value(),
+        Document::Plan => schemars::schema_for!(LogPlan).to_value(),
+        Document::Simulation => schemars::schema_for!(Summary).to_value(),
         Document::Tune => schemars::schema_for!(tune::Printed<'_>).to_value(),
         Document::TuneAttitude => schemars::schema_for!(tune::attitude::Printed<'_>).to_value(),
         Document::Ranking => schemars::schema_for!(Ranking).to_value(),

@@ -7,13 +7,15 @@ use anyhow::{Context, anyhow, bail};
 use super::Status;
 use super::files::{self, Kind};
 use super::flags::with_unit;
-use super::output::{digits, print_json, print_text, table};
+use super::output::{print_json, print_text};
 use crate::aircraft::airframe::Airplane;
 use crate::aircraft::airframe::trim::{Sideways, TrimRequest, Turn};
 use crate::aircraft::control::document::{CriterionDocument, LinearDocument, Linearized, ModeDocument};
 use crate::aircraft::flight::FlightDocument;
 use crate::export::atomic;
-use crate::units::Dimension;
+use crate::report::html;
+use crate::report::terminal::table;
+use crate::units::{Dimension, digits};
 
 mod page;
 
@@ -77,7 +79,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         atomic::write(path, text.as_bytes())?;
     }
     if let Some(path) = &args.report {
-        atomic::write(path, page::page(&linearized, &document).to_html()?.as_bytes())?;
+        atomic::write(path, html::page(&page::page(&linearized, &document))?.as_bytes())?;
     }
     if args.json {
         print_json(&document)?;

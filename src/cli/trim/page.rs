@@ -6,9 +6,9 @@ use super::{MODE_HEADER, criterion_header, criterion_rows, mode_row};
 use crate::aircraft::airframe::linear::LinearModel;
 use crate::aircraft::control::document::{LinearDocument, Linearized};
 use crate::report::figure::{self, Curve, Lines};
-use crate::report::page::{Page, Section};
+use crate::report::{Report, Section};
 
-pub(super) fn page(linearized: &Linearized, document: &LinearDocument) -> Page {
+pub(super) fn page<'a>(linearized: &'a Linearized, document: &'a LinearDocument) -> Report<'a> {
     let t = &document.trim;
     let deg = |x: f64| format!("{:.4}", x.to_degrees());
     let number = |x: f64| format!("{x:.5}");
@@ -29,10 +29,9 @@ pub(super) fn page(linearized: &Linearized, document: &LinearDocument) -> Page {
         state.iter().map(|(name, value)| vec![(*name).to_string(), value.clone()]).collect();
     rows.extend(t.used.iter().map(|u| vec![format!("{} used (%)", u.control), format!("{:.1}", 100.0 * u.share)]));
     let trim = Section::new("Steady flight").table("", &["", "value"], rows);
-    let trim = document.warnings.iter().fold(trim, |section, warning| section.warning(warning.clone()));
+    let trim = trim.findings("warning", document.warnings.clone());
     let modes: Vec<Vec<String>> = document.modes.iter().filter(|m| m.model != "full").map(mode_row).collect();
     let header = criterion_header(document);
-    let header: Vec<&str> = header.iter().map(String::as_str).collect();
     let reach = |list: &[crate::aircraft::control::document::ReachDocument]| -> Vec<Vec<String>> {
         let row = |r: &crate::aircraft::control::document::ReachDocument| {
             let cosines = |c: &[f64]| c.iter().map(|c| format!("{c:.4}")).collect::<Vec<_>>().join(", ");
@@ -65,31 +64,29 @@ pub(super) fn page(linearized: &Linearized, document: &LinearDocument) -> Page {
         step(&models.lateral, 0, 1.0_f64.to_radians(), "aileron 1 deg"),
         step(&models.lateral, 1, 1.0_f64.to_radians(), "rudder 1 deg"),
     ];
-    Page {
+    let responses = Section::new("Step responses").paragraph("Of the linear models, without servos.");
+    Report {
         title: format!("Steady flight of {}", document.airplane),
         subtitle: format!("{} m/s at {} m", t.airspeed, t.altitude),
-        badge: None,
         provenance: vec![("version".into(), document.version.into())],
         sections: vec![
             trim,
-            Section::new("Modes").table("", &MODE_HEADER, modes).figures(vec![(
-                poles(document),
-                "Eigenvalues of the longitudinal and the lateral model. Thin lines: least damping of Level 1 of the short period (0.35) and of the Dutch \
-                 roll (0.19) of MIL-F-8785C, categories A and C, A."
-                    .into(),
-            )]),
+            Section::new("Modes").table("", &MODE_HEADER, modes).figure(
+                "Eigenvalues of the longitudinal and the lateral model. Thin lines: least damping of Level 1 of the short \
+                 period (0.35) and of the Dutch roll (0.19) of MIL-F-8785C, categories A and C, A.",
+                || poles(document),
+            ),
             Section::new("Handling-quality levels")
                 .paragraph(format!("{}.", document.caution))
                 .table("Levels in the flight phases A, B, C", &header, criterion_rows(document)),
-            Section::new("Step responses")
-                .paragraph("Of the linear models, without servos.")
-                .figures(steps.into_iter().map(|svg| (svg, String::new())).collect()),
+            steps.into_iter().fold(responses, |section, svg| section.figure("", move || svg.clone())),
             Section::new("Controllability and observability")
                 .paragraph("Smallest singular value of [A − λI, B] and modal measures; they depend on the units: SI, and with velocities over the airspeed.")
                 .table("By inputs", &of, reach(&document.controllability))
                 .table("By rates", &of, reach(&document.observability))
-                .table("Gramian over 5 s, velocities over the airspeed", &["model", "by", "eigenvalues", "condition"], gramians.collect()),
+                .table("Gramian over 5 s, velocities over the airspeed", &["model", "by", "eigenvalues", "condition"], gramians),
         ],
+        ..Report::default()
     }
 }
 

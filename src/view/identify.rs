@@ -61,7 +61,7 @@ fn of_axis<'a>(axis: &'a IdentifiedAxis, params: &Params) -> Section<'a> {
         section = on_temperature(section, temperature);
     }
     if !found.between.is_empty() {
-        let each = found.between.iter().map(|own| format!("{} p = {}", own.parameter, digits(own.p_value)));
+        let each = found.between.iter().map(|b| format!("{} p = {}", b.parameter, digits(b.p_value)));
         section = section.paragraph(format!("Whether the logs are alike: {}", each.collect::<Vec<_>>().join(", ")));
     }
     if !found.not_identified.is_empty() {
@@ -111,8 +111,8 @@ fn not_identified(entry: &NotIdentified) -> String {
 fn candidates<'a>(section: Section<'a>, candidates: &[Candidate]) -> Section<'a> {
     let Some(chosen) = candidates.iter().find(|c| c.chosen) else { return section };
     let best = candidates.iter().map(|c| c.score).fold(f64::INFINITY, f64::min);
-    let against = |own: Option<f64>, other: Option<f64>| match (own, other) {
-        (Some(own), Some(other)) => format!("{:+.2}", own - other),
+    let against = |value: Option<f64>, chosen: Option<f64>| match (value, chosen) {
+        (Some(value), Some(chosen)) => format!("{:+.2}", value - chosen),
         _ => "-".into(),
     };
     let row = |(_, c): (usize, &Candidate)| {

@@ -1,8 +1,9 @@
 //! Parameters from a file of another program or from a datasheet.
 
+use super::alike;
 use super::parameters::term_rows;
 use crate::import::Imported;
-use crate::params::Params;
+use crate::params::{AxisParams, Params};
 use crate::report::{Level, Report, Section};
 use crate::units::digits;
 
@@ -19,22 +20,19 @@ pub fn import<'a>(found: &Imported) -> Report<'a> {
 
 /// Axes that are alike in one row.
 fn rows(params: &Params) -> Vec<Vec<String>> {
-    let mut groups: Vec<(String, Vec<Vec<String>>)> = Vec::new();
-    for axis in &params.axes {
-        let spread =
-            axis.turn_on_bias.iter().map(|v| ("turn-on bias sigma", v)).chain(axis.bias.iter().map(|v| ("bias", v)));
-        let own: Vec<Vec<String>> = term_rows(&axis.terms, params.quantity, params.sample_rate_hz)
-            .into_iter()
-            // a file has no intervals
-            .map(|row| [&row[..2], &row[4..]].concat())
-            .chain(spread.map(|(name, v)| vec![name.into(), digits(v.value), v.unit.to_string(), String::new()]))
-            .collect();
-        match groups.iter_mut().find(|(_, rows)| *rows == own) {
-            Some((names, _)) => *names += &format!(",{}", axis.name),
-            None => groups.push((axis.name.clone(), own)),
-        }
-    }
-    let named = |(names, rows): (String, Vec<Vec<String>>)| {
+    let of_axis = |axis: &AxisParams| -> Vec<Vec<String>> {
+        let spread = axis.turn_on_bias.iter().map(|v| ("turn-on bias sigma", v));
+        let bias = spread.chain(axis.bias.iter().map(|v| ("bias", v)));
+        // a file has no intervals
+        let terms = term_rows(&axis.terms, params.quantity, params.sample_rate_hz).into_iter();
+        let terms = terms.map(|row| [&row[..2], &row[4..]].concat());
+        terms
+            .chain(bias.map(|(name, v)| vec![name.into(), digits(v.value), v.unit.to_string(), String::new()]))
+            .collect()
+    };
+    let groups = alike(params.axes.iter().map(|axis| (axis.name.as_str(), of_axis(axis))), |a, b| a == b);
+    let named = |(names, rows): (Vec<&str>, Vec<Vec<String>>)| {
+        let names = names.join(",");
         rows.into_iter().map(move |row| [vec![names.clone()], row].concat())
     };
     groups.into_iter().flat_map(named).collect()

@@ -28,18 +28,22 @@ fn provenance<'a>(lines: impl IntoIterator<Item = (&'a str, String)>) -> Vec<(St
     lines.into_iter().chain([version]).map(|(label, value)| (label.to_string(), value)).collect()
 }
 
-/// "x, y: …" for what is said of each name, each sentence once.
-fn by_name<'a>(said: impl IntoIterator<Item = (&'a str, &'a [String])>) -> Vec<String> {
-    let mut found: Vec<(&str, Vec<&str>)> = Vec::new();
-    for (name, sentences) in said {
-        for sentence in sentences {
-            match found.iter_mut().find(|(other, _)| other == sentence) {
-                Some((_, names)) => names.push(name),
-                None => found.push((sentence, vec![name])),
-            }
+/// Names of what is alike together, each with the first of its kind, in order.
+fn alike<'n, T>(all: impl IntoIterator<Item = (&'n str, T)>, same: impl Fn(&T, &T) -> bool) -> Vec<(Vec<&'n str>, T)> {
+    let mut groups: Vec<(Vec<&str>, T)> = Vec::new();
+    for (name, one) in all {
+        match groups.iter_mut().find(|(_, first)| same(first, &one)) {
+            Some((names, _)) => names.push(name),
+            None => groups.push((vec![name], one)),
         }
     }
-    found.iter().map(|(sentence, names)| format!("{}: {sentence}", names.join(", "))).collect()
+    groups
+}
+
+/// "x, y: …" for what is said of each name, each sentence once.
+fn by_name<'a>(said: impl IntoIterator<Item = (&'a str, &'a [String])>) -> Vec<String> {
+    let each = said.into_iter().flat_map(|(name, sentences)| sentences.iter().map(move |sentence| (name, sentence)));
+    alike(each, |a, b| a == b).iter().map(|(names, sentence)| format!("{}: {sentence}", names.join(", "))).collect()
 }
 
 /// What a rate other than that of the parameters makes of the terms that count samples, each sentence once.
@@ -47,11 +51,11 @@ pub fn notes_of_rate(params: &Params, axes: &[&AxisParams], rate_hz: f64) -> Vec
     if (rate_hz / params.sample_rate_hz - 1.0).abs() <= RATE_TOLERANCE {
         return Vec::new();
     }
-    let [own, other] = [params.sample_rate_hz, rate_hz].map(digits);
+    let [from, to] = [params.sample_rate_hz, rate_hz].map(digits);
     let sentence = |axis: &AxisParams| {
         let counted = axis.noise().of_samples()?;
         Some(format!(
-            "{counted} belongs to the samples at {own} Hz: at {other} Hz the same coefficients are another process \
+            "{counted} belongs to the samples at {from} Hz: at {to} Hz the same coefficients are another process \
              (the corner of a filter moves with the rate)"
         ))
     };

@@ -33,9 +33,9 @@ pub(super) fn table<'a>(section: Section<'a>, found: &Identified, quantity: Quan
 }
 
 /// Standard deviation, its bound and their ratio, as far as there are any.
-fn cells(own: Option<&Precision>) -> [String; 3] {
+fn cells(precision: Option<&Precision>) -> [String; 3] {
     let none = || "-".to_string();
-    match own {
+    match precision {
         Some(Precision { std_dev_percent: sd, cramer_rao_percent: bound, .. }) if *sd < 1000.0 => {
             let known = bound.is_finite();
             let [bound, ratio] = [digits(*bound), format!("{:.2}", sd / bound)].map(|cell| known.then_some(cell));
@@ -56,11 +56,11 @@ pub(super) fn term_rows(terms: &[TermEntry], quantity: Quantity, sample_rate_hz:
     let mut rows = Vec::new();
     let wideband: Vec<&Measured> = terms.iter().filter_map(TermEntry::wideband_density).collect();
     let total = wideband.iter().map(|density| density.si()).fold(0.0, f64::hypot);
-    // the last of them is told as a random walk: all together
-    let and_all = |density: &Measured, own: Option<String>| {
+    // beside the last of them stands the random walk of all
+    let and_all = |density: &Measured, also: Option<String>| {
         let last = wideband.last().is_some_and(|last| std::ptr::eq(*last, density));
         let all = if last { random_walk_name(total, quantity) } else { None };
-        own.into_iter().chain(all).collect::<Vec<_>>().join("; ")
+        also.into_iter().chain(all).collect::<Vec<_>>().join("; ")
     };
     for term in terms {
         match term {

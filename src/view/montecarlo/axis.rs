@@ -54,8 +54,8 @@ impl<'a> AxisView<'a> {
 
     /// SI value of one of the shown unit, and that unit.
     fn shown(&self, si: &str) -> (f64, String) {
-        let own = si == self.of.experiment.design.quantity.si_unit();
-        if own { (self.unit.scale(), self.unit.to_string()) } else { (1.0, si.into()) }
+        let measured = si == self.of.experiment.design.quantity.si_unit();
+        if measured { (self.unit.scale(), self.unit.to_string()) } else { (1.0, si.into()) }
     }
 
     fn title(&self, what: &str) -> String {
@@ -64,11 +64,11 @@ impl<'a> AxisView<'a> {
 
     pub(super) fn section(self, paths: Paths<'a>) -> Section<'a> {
         let axis = self.axis;
-        let own = self.clone();
+        let view = self.clone();
         let section = Section::new(format!("Axis {}", axis.name)).at(Level::Page).figure(
             "Squared errors over the claimed covariance, per component: above 1 the filter is optimistic, below 1 \
              pessimistic. For a true filter the whole curve is in the band.",
-            move || own.nees(),
+            move || view.nees(),
         );
         let section = self.rms(self.errors(section, &paths));
         let mut section = section
@@ -90,20 +90,9 @@ impl<'a> AxisView<'a> {
     fn nees(&self) -> String {
         let (nees, experiment) = (&self.axis.nees, self.of.experiment);
         let label = if experiment.truth_spread { "expected, nominal truth" } else { "expected with this truth" };
-        let count = nees.time_s.len();
-        figure::nees(&figure::Nees {
-            title: self.title(&format!("NEES of {} runs", self.of.outcome.runs.count())),
-            time_s: nees.time_s.clone(),
-            nees: nees.mean.clone(),
-            lower: vec![nees.lower; count],
-            upper: vec![nees.upper; count],
-            expected: 1.0,
-            under_truth: experiment.truth.is_some().then(|| Curve {
-                label: label.into(),
-                points: nees.time_s.iter().copied().zip(nees.expected.iter().copied()).collect(),
-            }),
-            band_label: "band of the gate, all times together".into(),
-        })
+        let points = || nees.time_s.iter().copied().zip(nees.expected.iter().copied()).collect();
+        let expected = experiment.truth.is_some().then(|| Curve { label: label.into(), points: points() });
+        super::nees(self.axis, self.of.outcome, expected)
     }
 
     /// Errors of some runs, of the whole drift and of each state.

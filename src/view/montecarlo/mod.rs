@@ -11,7 +11,8 @@ use crate::consistency::Test;
 use crate::montecarlo::outcome::{Component, Detectable, FalseAlarmRate, Measure, Method, Rejection, Sighting};
 use crate::montecarlo::power::Needed;
 use crate::montecarlo::{AxisOutcome, Course, Experiment, Outcome, Path};
-use crate::params::{AxisParams, Measured};
+use crate::params::{AxisParams, Measured, Params};
+use crate::report::figure::{self, Curve};
 use crate::report::{Conclusion, Level, Report, Section};
 use crate::units::{Unit, digits};
 
@@ -132,32 +133,23 @@ fn coverage(axis: &AxisOutcome) -> String {
 
 /// Parameters of filter and truth side by side.
 fn parameters<'a>(experiment: &Experiment) -> Section<'a> {
-    let rows = experiment.design.axes.iter().flat_map(|axis| {
-        let truth = experiment.truth.as_ref();
-        let truth = truth.map(|truth| truth.axes.iter().find(|a| a.name == axis.name).map(listed).unwrap_or_default());
-        let own = listed(&axis.noise);
-        let mut names: Vec<&String> = Vec::new();
-        for (name, _) in own.iter().chain(truth.iter().flatten()) {
-            if !names.contains(&name) {
-                names.push(name);
-            }
-        }
+    let mut rows = Vec::new();
+    for axis in &experiment.design.axes {
+        let filter = listed(&axis.noise);
+        let of_truth = |truth: &Params| truth.axes.iter().find(|a| a.name == axis.name).map(listed).unwrap_or_default();
+        let truth = experiment.truth.as_ref().map_or_else(|| filter.clone(), of_truth);
         let find =
             |list: &[(String, Measured)], name: &str| list.iter().find(|(n, _)| n == name).map(|(_, m)| m.clone());
-        let row = |name: &&String| {
-            let filter = find(&own, name);
-            let truth = truth.as_ref().map_or_else(|| filter.clone(), |truth| find(truth, name));
-            row(&axis.name, name, filter.as_ref(), truth.as_ref(), experiment.truth_spread)
-        };
-        names.iter().map(row).collect::<Vec<_>>()
-    });
+        let further = truth.iter().filter(|(name, _)| find(&filter, name).is_none());
+        rows.extend(filter.iter().chain(further).map(|(name, _)| {
+            let drawn = experiment.truth_spread;
+            parameter_row(&axis.name, name, find(&filter, name).as_ref(), find(&truth, name).as_ref(), drawn)
+        }));
+    }
     let header = ["axis", "parameter", "filter", "truth", "filter / truth", "unit", "truth is drawn from"];
     let shown = if experiment.truth_spread { &header[..] } else { &header[..6] };
-    Section::new("Filter and truth").at(Level::Page).table(
-        "Noise parameters that the filter expects, and those that were simulated",
-        shown,
-        rows,
-    )
+    let caption = "Noise parameters that the filter expects, and those that were simulated";
+    Section::new("Filter and truth").at(Level::Page).table(caption, shown, rows)
 }
 
 /// Everything about an axis that has a number, by its name in documents.
@@ -165,50 +157,70 @@ fn listed(axis: &AxisParams) -> Vec<(String, Measured)> {
     let bias = axis.bias.iter().map(|m| ("bias".to_string(), m.clone()));
     let start = axis.turn_on_bias.iter().map(|m| ("turn_on_bias.std_dev".to_string(), m.clone()));
     let mut noise = axis.clone();
-    let noise: Vec<(String, Measured)> = noise.noise_parameters().map(|(name, m)| (name, m.clone())).collect();
-    bias.chain(start).chain(noise).collect()
+    bias.chain(start).chain(noise.noise_parameters().map(|(name, m)| (name, m.clone()))).collect()
 }
 
-fn row(axis: &str, name: &str, filter: Option<&Measured>, truth: Option<&Measured>, drawn: bool) -> Vec<String> {
+/// `drawn`: with the interval from which the truth is drawn.
+fn parameter_row(
+    axis: &str,
+    name: &str,
+    filter: Option<&Measured>,
+    truth: Option<&Measured>,
+    drawn: bool,
+) -> Vec<String> {
     let unit = filter.or(truth).map_or_else(Unit::one, |m| m.unit.clone());
-    let value = |m: Option<&Measured>| m.map(|m| unit.from_si(m.si()));
-    let text = |value: Option<f64>| value.map_or_else(|| "–".into(), digits);
-    let ratio =
-        value(filter).zip(value(truth)).filter(|(_, truth)| *truth != 0.0).map(|(filter, truth)| filter / truth);
+    let [of_filter, of_truth] = [filter, truth].map(|m| m.map(|m| unit.from_si(m.si())));
+    let ratio = of_filter.zip(of_truth.filter(|truth| *truth != 0.0)).map(|(filter, truth)| filter / truth);
+    let numbers = [of_filter, of_truth, ratio].map(|value| value.map_or_else(|| "–".into(), digits));
     let interval = truth.and_then(Measured::interval_si).map(|ends| ends.map(|end| digits(unit.from_si(end))));
-    let mut row =
-        vec![axis.into(), name.into(), text(value(filter)), text(value(truth)), text(ratio), unit.to_string()];
-    if drawn {
-        row.push(interval.map_or_else(|| "fixed".into(), |[lower, upper]| format!("{lower} … {upper}")));
-    }
-    row
+    let interval = interval.map_or_else(|| "fixed".into(), |[lower, upper]| format!("{lower} … {upper}"));
+    let names = [axis.to_string(), name.to_string()];
+    names.into_iter().chain(numbers).chain([unit.to_string()]).chain(drawn.then_some(interval)).collect()
 }
 
-fn tests<'a>(outcome: &Outcome) -> Section<'a> {
-    let failed = outcome.tests.iter().filter(|t| !t.pass());
-    let row = |test: &Test| {
-        let numbers = [test.statistic, test.lower, test.upper, test.p_value, test.adjusted_p_value].map(digits);
-        let result = if test.pass() { "pass" } else { "FAIL" };
-        let names = [test.axis.clone(), test.name.clone()];
-        names.into_iter().chain(numbers).chain([result.to_string(), test.meaning.clone()])
-    };
-    let caption = format!(
+pub(super) const TESTS: [&str; 9] =
+    ["axis", "test", "statistic", "lower", "upper", "p", "family-wise p", "result", "meaning"];
+
+pub(super) fn tests_caption(outcome: &Outcome) -> String {
+    format!(
         "Tests: a true filter keeps within all bounds with {} %; a test is beyond its bounds when its p is at most {}, its \
          family-wise p at most {}",
         digits(100.0 * (1.0 - outcome.alpha)),
         digits(outcome.critical_p_value),
         outcome.alpha
-    );
+    )
+}
+
+pub(super) fn test_row(test: &Test) -> impl Iterator<Item = String> + use<> {
+    let numbers = [test.statistic, test.lower, test.upper, test.p_value, test.adjusted_p_value].map(digits);
+    let result = if test.pass() { "pass" } else { "FAIL" };
+    let names = [test.axis.clone(), test.name.clone()];
+    names.into_iter().chain(numbers).chain([result.to_string(), test.meaning.clone()])
+}
+
+fn tests<'a>(outcome: &Outcome) -> Section<'a> {
+    let failed = outcome.tests.iter().filter(|t| !t.pass());
     Section::of_page("Tests")
         .at(Level::Page)
-        .list(failed.map(|t: &Test| format!("{}, {}: {}.", t.axis, t.name, t.meaning)).collect())
+        .list(failed.map(|t| format!("{}, {}: {}.", t.axis, t.name, t.meaning)).collect())
         .at(Level::Full)
-        .table(
-            caption,
-            &["axis", "test", "statistic", "lower", "upper", "p", "family-wise p", "result", "meaning"],
-            outcome.tests.iter().map(row),
-        )
+        .table(tests_caption(outcome), &TESTS, outcome.tests.iter().map(test_row))
         .minor(&["lower", "upper", "p"])
+}
+
+/// NEES over time with the band of the gate; `expected` under the truth where that is another.
+pub(super) fn nees(axis: &AxisOutcome, outcome: &Outcome, expected: Option<Curve>) -> String {
+    let nees = &axis.nees;
+    figure::nees(&figure::Nees {
+        title: format!("{}: NEES of {} runs", axis.name, outcome.runs.count()),
+        time_s: nees.time_s.clone(),
+        nees: nees.mean.clone(),
+        lower: vec![nees.lower; nees.time_s.len()],
+        upper: vec![nees.upper; nees.time_s.len()],
+        expected: 1.0,
+        under_truth: expected,
+        band_label: "band of the gate, all times together".into(),
+    })
 }
 
 /// What the gate does to a true filter and to wrong ones.
@@ -236,7 +248,7 @@ fn gate<'a>(of: &MonteCarlo<'_>) -> Section<'a> {
         .paragraphs(of.plans.to_vec())
 }
 
-/// How surely the given truth is told from the design.
+/// How surely the given truth is rejected.
 fn rejected(rejection: &Rejection) -> String {
     let counted =
         rejection.confirmed.map_or_else(String::new, |c| format!("; {} of {} experiments did", c.caught, c.of));

@@ -24,8 +24,8 @@ pub(super) fn section<'a>(group: &Group<'a>, insight: &'a Insight) -> Section<'a
             output.name.replace('_', " "),
             digits(output.sigma / scale)
         );
-        let own = group.clone();
-        section = section.figure("", move || figure(&own, output)).table(
+        let of_group = group.clone();
+        section = section.figure("", move || figure(&of_group, output)).table(
             caption,
             &["parameter", "value", "at half of it", "change", "at twice", "change"],
             worth_rows(output, scale),

@@ -7,13 +7,13 @@ mod ranking;
 mod states;
 mod truth;
 
-use super::provenance;
+use super::{alike, montecarlo, provenance};
 use crate::consistency::Verdict;
 use crate::filter::AxisDesign;
 use crate::montecarlo::{AxisOutcome, Outcome};
 use crate::params::Params;
 use crate::replay::ReplayResult;
-use crate::report::figure::{self, BudgetItem, Nees, Sigma, SigmaState};
+use crate::report::figure::{self, BudgetItem, Sigma, SigmaState};
 use crate::report::{Conclusion, Level, Report, Section};
 use crate::tune::objective::Record;
 use crate::tune::{AxisReport, Insight, PlantBudget, Share, Tuned, UnderTruth};
@@ -50,7 +50,10 @@ struct Group<'a> {
 
 impl Group<'_> {
     fn title(&self) -> String {
-        title(&self.names)
+        match self.names[..] {
+            [one] => format!("axis {one}"),
+            _ => format!("axes {} (identical)", self.names.join(", ")),
+        }
     }
 
     /// Scale and text of what is shown for a unit in SI.
@@ -64,31 +67,25 @@ impl Group<'_> {
     }
 }
 
-fn title(names: &[&str]) -> String {
-    match names {
-        [one] => format!("axis {one}"),
-        many => format!("axes {} (identical)", many.join(", ")),
-    }
+/// Every axis by its name, for itself.
+fn axes<'a>(of: &Design<'a>) -> impl Iterator<Item = (&'a str, Group<'a>)> {
+    let quantity = of.params.quantity;
+    let axes = of.tuned.design.axes.iter().zip(&of.tuned.reports).zip(&of.params.axes);
+    axes.map(move |((design, report), params)| {
+        let unit = params.display_unit(quantity);
+        (design.name.as_str(), Group { names: Vec::new(), design, report, quantity, unit })
+    })
 }
 
-/// Axes of the same numbers together, in order.
+/// Axes of the same numbers together.
 fn groups<'a>(of: &Design<'a>) -> Vec<Group<'a>> {
-    let mut groups: Vec<Group<'a>> = Vec::new();
-    let quantity = of.params.quantity;
-    for ((design, report), params) in of.tuned.design.axes.iter().zip(&of.tuned.reports).zip(&of.params.axes) {
-        let unit = params.display_unit(quantity);
-        let same = |g: &&mut Group<'_>| {
-            g.unit == unit
-                && g.design.model == design.model
-                && g.report.warnings == report.warnings
-                && g.report.predicted == report.predicted
-        };
-        match groups.iter_mut().find(same) {
-            Some(group) => group.names.push(&design.name),
-            None => groups.push(Group { names: vec![&design.name], design, report, quantity, unit }),
-        }
-    }
-    groups
+    let same = |a: &Group<'_>, b: &Group<'_>| {
+        a.unit == b.unit
+            && a.design.model == b.design.model
+            && a.report.warnings == b.report.warnings
+            && a.report.predicted == b.report.predicted
+    };
+    alike(axes(of), same).into_iter().map(|(names, group)| Group { names, ..group }).collect()
 }
 
 pub fn tune<'a>(of: &Design<'a>) -> Report<'a> {
@@ -98,7 +95,7 @@ pub fn tune<'a>(of: &Design<'a>) -> Report<'a> {
     let headline =
         format!("{}: plant {}, {} Hz, {}", of.name, of.tuned.design.plant, params.sample_rate_hz, measured(of));
     sections.push(Section::new("").at(Level::Brief).paragraph(headline));
-    sections.extend(groups.iter().map(of_group));
+    sections.extend(groups.iter().map(group_section));
     sections.extend(groups.iter().filter_map(|group| {
         let insight = of.insights.iter().find(|insight| Some(&insight.axis.as_str()) == group.names.first())?;
         Some(insight::section(group, insight))
@@ -136,13 +133,13 @@ fn measured(of: &Design<'_>) -> String {
     inputs.chain(measurements).collect::<Vec<_>>().join(", ")
 }
 
-fn of_group<'a>(group: &Group<'a>) -> Section<'a> {
+fn group_section<'a>(group: &Group<'a>) -> Section<'a> {
     let report = group.report;
-    let own = group.clone();
+    let of_group = group.clone();
     let mut section = states::tables(Section::new(group.title()), group)
         .list(report.observability.clone())
         .findings("note", report.warnings.clone())
-        .figure("What the filter promises, from the first measurement on.", move || sigma(&own))
+        .figure("What the filter promises, from the first measurement on.", move || sigma(&of_group))
         .at(Level::Page);
     if !report.error_budget.is_empty() {
         let shown = group.shown(group.quantity.si_unit());
@@ -152,10 +149,10 @@ fn of_group<'a>(group: &Group<'a>) -> Section<'a> {
         });
     }
     for (state, plant) in report.plant_budgets.iter().enumerate() {
-        let (own, shown) = (group.clone(), group.shown(&plant.unit));
+        let (of_group, shown) = (group.clone(), group.shown(&plant.unit));
         if plant.unit != group.quantity.si_unit() {
             let caption = format!("What the filter promises of the {}.", plant.state);
-            section = section.figure(caption, move || plant_sigma(&own, state, plant));
+            section = section.figure(caption, move || plant_sigma(&of_group, state, plant));
         }
         let title = format!("{}: error budget of the {}", group.title(), plant.state);
         let caption = format!("Causes of the final variance of the {}.", plant.state);
@@ -229,13 +226,9 @@ fn verification<'a>(of: &Design<'a>) -> Section<'a> {
         let numbers = numbers.map(super::or_dash);
         std::iter::once(axis.name.clone()).chain(numbers).chain([result(mine().all(|t| t.pass()))]).collect::<Vec<_>>()
     };
-    let tests = outcome.tests.iter().map(|t| {
-        let numbers = [t.statistic, t.lower, t.upper, t.adjusted_p_value].map(digits);
-        [t.axis.clone(), t.name.clone()].into_iter().chain(numbers).chain([result(t.pass())])
-    });
     let mut section = Section::of_page("Verification by Monte Carlo").at(Level::Page);
     for axis in &outcome.axes {
-        section = section.figure("", move || nees(axis, outcome));
+        section = section.figure("", move || montecarlo::nees(axis, outcome, None));
     }
     section
         .at(Level::Full)
@@ -245,15 +238,7 @@ fn verification<'a>(of: &Design<'a>) -> Section<'a> {
             outcome.axes.iter().map(row),
         )
         .at(Level::Page)
-        .table(
-            format!(
-                "Tests: a true filter keeps within all bounds with {} %; p adjusted for all {} tests",
-                digits(100.0 * (1.0 - outcome.alpha)),
-                outcome.tests.len()
-            ),
-            &["axis", "test", "statistic", "lower", "upper", "p", "result"],
-            tests,
-        )
+        .table(montecarlo::tests_caption(outcome), &montecarlo::TESTS, outcome.tests.iter().map(montecarlo::test_row))
 }
 
 /// What was run and what it means.
@@ -272,19 +257,6 @@ fn verification_sentence(outcome: &Outcome, sample_rate_hz: f64) -> String {
     let failed = outcome.tests.iter().filter(|t| !t.pass());
     let failed: Vec<String> = failed.map(|t| format!("{} {}: {}", t.axis, t.name, t.meaning)).collect();
     format!("{what}: {}", failed.join("; "))
-}
-
-fn nees(axis: &AxisOutcome, outcome: &Outcome) -> String {
-    figure::nees(&Nees {
-        title: format!("{}: NEES of {} runs", axis.name, outcome.runs.count()),
-        time_s: axis.nees.time_s.clone(),
-        nees: axis.nees.mean.clone(),
-        lower: vec![axis.nees.lower; axis.nees.time_s.len()],
-        upper: vec![axis.nees.upper; axis.nees.time_s.len()],
-        expected: 1.0,
-        under_truth: None,
-        band_label: "band of the gate, all times together".into(),
-    })
 }
 
 /// The verdict of a log.

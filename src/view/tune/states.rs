@@ -64,67 +64,45 @@ fn facts(group: &Group<'_>) -> Vec<(&'static str, String)> {
         let is_noise =
             |s: usize| model.h[(i, s)] != 0.0 && NOISE.iter().any(|kind| model.states[s].name.contains(kind));
         let white = if (0..model.states.len()).any(is_noise) { "white noise of " } else { "" };
-        facts.push((
-            "R",
-            format!(
-                "{} ({unit})^2: {white}one sample{which} has sigma {} {unit}",
-                digits(root_r * root_r),
-                digits(root_r)
-            ),
-        ));
+        let [r, sigma] = [root_r * root_r, root_r].map(digits);
+        facts.push(("R", format!("{r} ({unit})^2: {white}one sample{which} has sigma {sigma} {unit}")));
     }
     if steady.period > 1 {
-        let text = format!(
-            "{} samples: steady sigma and gain are those at a sample at which every measurement is taken, after it",
-            steady.period
-        );
-        facts.push(("period", text));
+        let what = "steady sigma and gain are those at a sample at which every measurement is taken, after it";
+        facts.push(("period", format!("{} samples: {what}", steady.period)));
     }
-    facts.extend([
-        ("closed-loop poles", poles_text(&steady.poles, model.dt)),
-        (
-            "settling time",
-            if steady.settling_time > 0.0 {
-                format!("{} s (four time constants of the slowest driven pole)", digits(steady.settling_time))
-            } else {
-                "never: the estimate gets better for ever".into()
-            },
-        ),
-        (
-            "drift estimate settled",
-            report.drift_settling_time_s.map_or_else(
-                || "later than the table below reaches".into(),
-                |t| format!("{} s (sigma within 5 % of its final value)", digits(t)),
-            ),
-        ),
-        (
-            "Riccati equation",
-            format!(
-                "relative residual {:.1e}, difference to the eigenvector solution {:.1e}",
-                steady.residual, steady.eigenvector_difference
-            ),
-        ),
-    ]);
+    facts.push(("closed-loop poles", poles_text(&steady.poles, model.dt)));
+    let settling = Some(steady.settling_time).filter(|time| *time > 0.0).map_or_else(
+        || "never: the estimate gets better for ever".into(),
+        |time| format!("{} s (four time constants of the slowest driven pole)", digits(time)),
+    );
+    facts.push(("settling time", settling));
+    let settled = report.drift_settling_time_s.map_or_else(
+        || "later than the table below reaches".into(),
+        |time| format!("{} s (sigma within 5 % of its final value)", digits(time)),
+    );
+    facts.push(("drift estimate settled", settled));
+    facts.extend(bandwidth(group).map(|text| ("bandwidth", text)));
+    let (residual, difference) = (steady.residual, steady.eigenvector_difference);
+    let riccati = format!("relative residual {residual:.1e}, difference to the eigenvector solution {difference:.1e}");
+    facts.push(("Riccati equation", riccati));
+    facts
+}
+
+fn bandwidth(group: &Group<'_>) -> Option<String> {
+    let (model, report) = (&group.design.model, group.report);
     let output = model.outputs.iter().find(|output| output.name != DRIFT);
-    let bandwidth = match (report.bandwidth_hz, output) {
-        (Some(f), None) => Some(format!("{} Hz (half power of the drift estimate)", digits(f))),
+    match (report.bandwidth_hz.map(digits), output) {
+        (Some(hz), None) => Some(format!("{hz} Hz (half power of the drift estimate)")),
         (None, None) if report.error_budget.is_empty() => Some("0: the filter follows no drift".into()),
         (None, None) => Some("up to half the sample rate: the drift estimate follows each sample".into()),
-        (Some(f), Some(output)) => {
-            let above = if model.inputs.is_empty() {
-                String::new()
-            } else {
-                format!(", above it the {}", model.inputs[0].name)
-            };
-            let (hz, state, measurement) = (digits(f), &output.name, &model.measurements[0].name);
+        (Some(hz), Some(output)) => {
+            let above = model.inputs.first().map_or_else(String::new, |input| format!(", above it the {}", input.name));
+            let (state, measurement) = (&output.name, &model.measurements[0].name);
             Some(format!("{hz} Hz: below it the {state} follows the {measurement}{above} (half power)"))
         }
         (None, Some(_)) => None,
-    };
-    if let Some(bandwidth) = bandwidth {
-        facts.insert(facts.len() - 1, ("bandwidth", bandwidth));
     }
-    facts
 }
 
 fn pole_text((re, im): (f64, f64), dt: f64) -> String {

@@ -2,6 +2,7 @@
 
 mod montecarlo;
 mod records;
+mod terminal;
 
 use kfdesign::consistency::Verdict;
 use kfdesign::report::figure::*;

@@ -3,9 +3,11 @@
 //!
 //! [`Report`]: crate::report::Report
 
+pub mod airplane;
 pub mod allan;
 pub mod compare;
 pub mod export;
+pub mod fly;
 pub mod identify;
 pub mod import;
 pub mod inflate;
@@ -15,6 +17,7 @@ mod parameters;
 pub mod plan;
 pub mod replay;
 pub mod simulate;
+pub mod trim;
 pub mod tune;
 mod verdict;
 

@@ -3,13 +3,15 @@
 use super::{by_name, or_dash, provenance, verdict};
 use crate::compare::{AxisComparison, Band, Beside, Comparison};
 use crate::report::figure::{self, SpectrumRatio};
-use crate::report::{self, Conclusion, Report, Section};
+use crate::report::{self, Conclusion, Level, Report, Section};
 use crate::units::{Unit, digits};
 
 /// `unit`: of the log.
 pub fn compare<'a>(result: &'a Comparison, unit: &'a Unit) -> Report<'a> {
     let given = |value: &Option<String>| value.clone().unwrap_or_default();
     let axes = &result.axes;
+    // they differ in their numbers alone, which the table has
+    let mut sentences = axes.iter().map(|a| format!("{}: {}.", a.name, a.means.sentence));
     let means = Section::of_page("Means, which prove nothing")
         .table(
             format!("Means in {unit}, which prove nothing"),
@@ -20,7 +22,9 @@ pub fn compare<'a>(result: &'a Comparison, unit: &'a Unit) -> Report<'a> {
                 [a.name.clone(), a.log_axis.clone(), a.samples.to_string(), real, simulated, sigma]
             }),
         )
-        .list(axes.iter().map(|a| format!("{}: {}.", a.name, a.means.sentence)).collect());
+        .list(sentences.next().into_iter().collect())
+        .at(Level::Page)
+        .list(sentences.collect());
     let numbers = Section::of_page("The file's numbers")
         .table(
             "The file's numbers and the log's own (95 % intervals, each alone)",
@@ -31,8 +35,9 @@ pub fn compare<'a>(result: &'a Comparison, unit: &'a Unit) -> Report<'a> {
     let notes =
         Section::of_page("Notes").findings("note", by_name(axes.iter().map(|a| (a.name.as_str(), a.notes.as_slice()))));
     let tests = verdict::tests("the model on this log", "", &result.tests, result.alpha);
-    let mut sections = vec![tests, means, numbers, notes];
+    let mut sections = vec![tests, numbers, notes];
     sections.extend(axes.iter().map(|axis| figures(axis, result.alpha, unit)));
+    sections.push(means);
     Report {
         title: format!("{} against {}", given(&result.log), given(&result.params)),
         subtitle: "A noise model held against a log: does it fit?".into(),

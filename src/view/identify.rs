@@ -46,11 +46,12 @@ pub fn identify<'a>(params: &Params, axes: &'a [IdentifiedAxis], shared: Option<
 fn of_axis<'a>(axis: &'a IdentifiedAxis, params: &Params) -> Section<'a> {
     let found = &axis.found;
     let section = Section::of_page(found.params.name.clone()).at(Level::Brief).paragraph(headline(axis));
-    let mut section = parameters::table(section, found, params.quantity).at(Level::Full);
-    section = candidates(section, &found.candidates)
+    let section = parameters::table(section, found, params.quantity)
+        .at(Level::Full)
         .figure("The measured curve with exact 95 % intervals for the model, and the model's terms.", || {
             allan::figure(&axis.measured)
         });
+    let mut section = candidates(section, &found.candidates);
     if !found.steps.is_empty() {
         section = section
             .table("The recipe, step by step", &["step", "formula", "value", "unit"], found.steps.iter().map(step))

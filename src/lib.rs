@@ -65,3 +65,4 @@ pub mod signal;
 pub mod simulate;
 pub mod tune;
 pub mod units;
+pub mod view;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// The one table of rooms: floor, room, and the rooms of its own floor it may use besides every lower floor.
 /// `docs/architecture.md` shows the same table.
-const HOUSE: [(u8, &str, &[&str]); 24] = [
+const HOUSE: [(u8, &str, &[&str]); 25] = [
     (0, "units", &[]),
     (0, "numerics", &[]),
     (1, "signal", &[]),
@@ -29,7 +29,8 @@ const HOUSE: [(u8, &str, &[&str]); 24] = [
     (5, "montecarlo", &[]),
     (6, "export", &[]),
     (6, "report", &[]),
-    (7, "cli", &[]),
+    (7, "view", &[]),
+    (8, "cli", &[]),
 ];
 
 /// The wings: folders of rooms that stand on floors of their own.
@@ -330,6 +331,12 @@ fn complaints(file: &str, source: &str) -> Vec<String> {
     if room != "cli" && room != "main" && names_a_flag(source) {
         out.push(format!("src/{file}: names a --flag: write `name` of the option, which src/cli/output.rs translates"));
     }
+    if room != "cli" && has(&["clap"]) {
+        out.push(format!("src/{file}: clap outside src/cli: flags are read there alone"));
+    }
+    if room == "view" && (has(&["fs", "::"]) || has(&["File", "::"])) {
+        out.push(format!("src/{file}: a view reads and writes no files: it makes a report of a result"));
+    }
     if file != "cli/output.rs" {
         for stream in ["stdout", "stderr"] {
             if has(&[stream, "("]) {
@@ -439,7 +446,7 @@ fn each_rule_bites() {
         ("noise/white.rs", "mod tests { use super::super::Term; use super::*; }"),
         ("params.rs", "use crate::noise::Term;"),
         ("consistency/whiteness.rs", "use crate::filter::Kalman;"),
-        ("cli/output.rs", "fn f() -> anyhow::Result<()> { std::io::stdout(); crate::report::page::Page; }"),
+        ("cli/output.rs", "fn f() -> anyhow::Result<()> { std::io::stdout(); crate::view::plan::plan; }"),
         ("main.rs", "fn main() { kfdesign::cli::main(); std::process::exit(1) }"),
     ] {
         assert_eq!(complaints(file, source), Vec::<String>::new(), "{source}");
@@ -458,6 +465,17 @@ fn each_rule_bites() {
         "fn f() { std::io::stdout().lock(); }",
     ] {
         assert!(bites("tune/mod.rs", source), "{source}");
+    }
+    // a view shows what it is given
+    for source in [
+        "fn f() { println!(\"x\") }",
+        "fn f() { std::io::stdout().lock(); }",
+        "#[derive(clap::Args)] struct Flags;",
+        "fn f() { std::fs::read(\"x\"); }",
+        "use std::fs::File; fn f() { File::open(\"x\"); }",
+        "use crate::cli::output;",
+    ] {
+        assert!(bites("view/plan.rs", source), "{source}");
     }
     for source in
         ["fn f() { std::process::exit(2) }", "use std::process; fn f() { process::exit(2) }", "fn f() { exit(2) }"]

@@ -2,10 +2,11 @@
 
 mod montecarlo;
 mod records;
+mod terminal;
 
 use kfdesign::consistency::Verdict;
 use kfdesign::report::figure::*;
-use kfdesign::report::page::{Badge, Page, Section};
+use kfdesign::report::{Conclusion, Level, Report, Section, html};
 
 /// Reproducible standard normal numbers: only something to draw.
 struct Normals(u64);
@@ -258,20 +259,33 @@ fn gallery() -> Vec<(&'static str, String)> {
     ]
 }
 
-fn page() -> Page {
-    let figures = |names: &[&str]| {
-        gallery()
-            .into_iter()
-            .filter(|f| names.contains(&f.0))
-            .map(|(name, svg)| (svg, format!("What {name} says.")))
-            .collect()
+fn report() -> Report<'static> {
+    let figures = |section: Section<'static>, names: &[&str]| {
+        let wanted = gallery().into_iter().filter(|figure| names.contains(&figure.0));
+        wanted.fold(section, |section, (name, svg)| section.figure(format!("What {name} says."), move || svg.clone()))
     };
-    Page {
+    let row = |axis| {
+        [
+            axis,
+            "nis",
+            "1.0002",
+            "0.9967",
+            "1.0033",
+            "0.887",
+            "1.000",
+            "Mean NIS is what the filter predicts, so R is right.",
+        ]
+    };
+    let sha256 = "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08";
+    Report {
         title: "Replay of rest.csv".into(),
         subtitle: "Filter design skydog.json, three gyro axes at 100 Hz".into(),
-        badge: Some(Badge::new(Verdict::Consistent, "No test rejects at the family-wise level 0.01 (Holm, 9 tests).")),
+        verdict: Some(Conclusion::new(
+            Verdict::Consistent,
+            "No test rejects at the family-wise level 0.01 (Holm, 9 tests).",
+        )),
         provenance: vec![
-            ("log".into(), "rest.csv, 720 000 samples, 7200 s, sha256 9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08".into()),
+            ("log".into(), format!("rest.csv, 720 000 samples, 7200 s, sha256 {sha256}")),
             ("version".into(), "0.1.0".into()),
         ],
         sections: vec![
@@ -280,12 +294,14 @@ fn page() -> Page {
                 .table(
                     "Tests",
                     &["axis", "test", "statistic", "lower", "upper", "p", "adjusted p", "meaning"],
-                    ["gyro_x", "gyro_y", "gyro_z"].iter().map(|a| ["", "nis", "1.0002", "0.9967", "1.0033", "0.887", "1.000", "Mean NIS is what the filter predicts, so R is right."].iter().enumerate().map(|(i, c)| if i == 0 { (*a).to_owned() } else { (*c).to_owned() }).collect()).collect(),
+                    ["gyro_x", "gyro_y", "gyro_z"].map(row),
                 )
-                .warning("A gap of 2.4 s at 1312 s was propagated over."),
-            Section::new("gyro_x").figures(figures(&["estimate", "innovations", "autocorrelation", "nis", "periodogram"])),
-            Section::new("Design").figures(figures(&["allan", "sigma", "budget", "nees", "nees5", "errors", "rms"])).list(vec!["One sentence.".into(), "Another sentence.".into()]),
+                .findings("warning", vec!["A gap of 2.4 s at 1312 s was propagated over.".into()]),
+            figures(Section::new("gyro_x"), &["estimate", "innovations", "autocorrelation", "nis", "periodogram"]),
+            figures(Section::new("Design"), &["allan", "sigma", "budget", "nees", "nees5", "errors", "rms"])
+                .list(vec!["One sentence.".into(), "Another sentence.".into()]),
         ],
+        ..Report::default()
     }
 }
 
@@ -529,30 +545,34 @@ fn words_from_a_log_cannot_become_markup() {
     let svg = allan(&data);
     assert!(!svg.contains("<script") && !svg.contains('\u{1}'));
     assert_well_formed(&svg, "evil");
-    let page = Page {
+    let drawn = svg.clone();
+    let report = Report {
         title: evil.into(),
         subtitle: evil.into(),
-        badge: Some(Badge::new(Verdict::Inconclusive, evil)),
+        verdict: Some(Conclusion::new(Verdict::Inconclusive, evil)),
         provenance: vec![(evil.into(), evil.into())],
         sections: vec![
             Section::new(evil)
                 .paragraph(evil)
-                .warning(evil)
+                .findings("warning", vec![evil.into()])
                 .list(vec![evil.into()])
-                .table(evil, &[evil, evil], vec![vec![evil.into(), evil.into()]])
-                .figures(vec![(svg.clone(), evil.into())]),
+                .command(evil, evil)
+                .table(evil, &[evil, evil], [[evil, evil]])
+                .figure(evil, move || drawn.clone()),
         ],
+        ..Report::default()
     };
-    let html = page.to_html().unwrap();
+    let html = html::page(&report).unwrap();
     assert!(!html.contains("<script"));
-    // title and h1, subtitle, badge, term and value, heading, paragraph, warning, item, table's label and caption, two headers, two cells with their labels, caption
+    // title and h1, subtitle, verdict, term and value, heading, paragraph, finding, item, command and its purpose, the
+    // table's label and caption, two headers, two cells with their labels, caption
     let count = |text: &str| text.matches("&lt;script&gt;").count();
-    assert_eq!(count(&html) - count(&svg), 19);
+    assert_eq!(count(&html) - count(&svg), 21);
 }
 
 #[test]
 fn page_is_self_contained() {
-    let html = page().to_html().unwrap();
+    let html = html::page(&report()).unwrap();
     save("page.html", &html);
     for alien in ["<script", "<link", "@import", "url(", "src=", "href="] {
         assert!(!html.contains(alien), "{alien}");
@@ -565,7 +585,26 @@ fn page_is_self_contained() {
         (Verdict::Inconsistent, "inconsistent"),
         (Verdict::Inconclusive, "inconclusive"),
     ] {
-        let page = Page { badge: Some(Badge::new(verdict, "why")), ..Page::default() };
-        assert!(page.to_html().unwrap().contains(&format!("<b>{word}</b><span>why</span>")), "{word}");
+        let report = Report { verdict: Some(Conclusion::new(verdict, "why")), ..Report::default() };
+        assert!(html::page(&report).unwrap().contains(&format!("<b>{word}</b><span>why</span>")), "{word}");
     }
+}
+
+#[test]
+fn a_page_has_every_level_and_a_sheet_the_figures_above_the_page() {
+    let svg = |name: &str| gallery().into_iter().find(|figure| figure.0 == name).unwrap().1;
+    let section = Section::of_page("Heading")
+        .at(Level::Brief)
+        .paragraph("the answer")
+        .at(Level::Page)
+        .paragraph("the rest")
+        .figure("", || svg("budget"))
+        .at(Level::Full)
+        .figure("", || svg("sigma"));
+    let report = Report { sections: vec![section], ..Report::default() };
+    let html = html::page(&report).unwrap();
+    assert!(html.contains("<h2>Heading</h2>") && html.contains("the answer") && html.contains("the rest"));
+    assert_eq!(html.matches("<svg ").count(), 2);
+    let sheet = report.sheet("All");
+    assert!(sheet.contains("predicted sigma") && !sheet.contains("error budget"), "{sheet}");
 }

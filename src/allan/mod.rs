@@ -18,6 +18,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::noise::NoiseModel;
 use crate::numerics::progress::checkpoint;
+use crate::units::Unit;
 pub use pooled::Pooled;
 
 /// Which deviation.
@@ -106,6 +107,19 @@ pub struct AllanCurve {
     /// Windows of that many samples, of which the squares were averaged; 1 unless the log was read in windows.
     pub windows: u64,
     pub points: Vec<AllanPoint>,
+}
+
+/// The curve of one axis of a log; SI.
+#[derive(Clone, Debug)]
+pub struct AxisCurve {
+    pub name: String,
+    /// Of the rate, in the spelling of the log.
+    pub unit: Unit,
+    /// What of the log was used, where it was not the whole of it in one piece.
+    pub note: Option<String>,
+    pub curve: AllanCurve,
+    /// The fitted mixture or why there is none.
+    pub fit: Result<NoiseModel, String>,
 }
 
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

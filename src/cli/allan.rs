@@ -13,16 +13,14 @@ use serde::Serialize;
 use super::Status;
 use super::files::{self, Kind};
 use super::log_flags::{LogFlags, print_check};
-use super::output::{digits, print_json, print_text, progress, say, table};
+use super::output::{print_json, print_report, progress, say};
 use super::stretch::{Stretch, into_stretches};
-use crate::allan::{self, AllanCurve, Deviation, NoiseType, TauGrid};
-use crate::export::atomic;
+use crate::allan::{self, AxisCurve, Deviation, NoiseType, TauGrid};
 use crate::identify::{self, Method, ModelChoice};
 use crate::input::LogOptions;
-use crate::noise::NoiseModel;
-use crate::report;
 use crate::signal::LogCheck;
-use crate::units::{Quantity, Unit};
+use crate::units::Quantity;
+use crate::view;
 
 /// Allan deviations of a log, with intervals and noise identification
 #[derive(Debug, clap::Args)]
@@ -150,18 +148,6 @@ pub enum Intervals {
     PowerLaw,
 }
 
-/// One axis, SI.
-pub(super) struct AxisCurve {
-    pub(super) name: String,
-    /// Of the rate, in the spelling of the log.
-    pub(super) unit: Unit,
-    /// What of the log was used, where it was not the whole of it in one piece.
-    pub(super) note: Option<String>,
-    pub(super) curve: AllanCurve,
-    /// The fitted mixture or why there is none.
-    pub(super) fit: Result<NoiseModel, String>,
-}
-
 /// What is said of the log as a whole.
 struct Header {
     name: String,
@@ -185,19 +171,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     }
     let name = header.name.clone();
     let document = document(&axes, args.deviation.kind(), header);
-    if let Some(path) = &args.output {
-        let mut text = serde_json::to_string_pretty(&document)?;
-        text.push('\n');
-        atomic::write(path, text.as_bytes())?;
-    }
-    if let Some(path) = &args.plot {
-        atomic::write(path, sheet(&name, &axes).as_bytes())?;
-    }
+    files::write_json(args.output.as_deref(), &document)?;
+    let report = view::allan::allan(&name, &axes);
+    files::write_plot(args.plot.as_deref(), &format!("{name}: {}", args.deviation.kind().name()), &report)?;
     if args.json {
         print_json(&document)?;
     } else {
-        let text: Vec<String> = axes.iter().map(|axis| text(axis, args.deviation)).collect();
-        print_text(&text.join("\n"));
+        print_report(&report);
     }
     Ok(Status::Done)
 }
@@ -253,12 +233,6 @@ fn notes(axis: &AxisCurve) {
     }
 }
 
-/// "white + gauss_markov".
-fn model_name(model: &NoiseModel) -> String {
-    let names: Vec<&str> = model.terms.iter().map(|term| term.kind().name()).collect();
-    names.join(" + ")
-}
-
 fn document(axes: &[AxisCurve], deviation: Deviation, header: Header) -> Document {
     let axes = axes
         .iter()
@@ -278,7 +252,7 @@ fn document(axes: &[AxisCurve], deviation: Deviation, header: Header) -> Documen
                 terms: points.iter().map(|p| p.terms).collect(),
                 noise: points.iter().map(|p| p.noise).collect(),
                 intervals: if axis.fit.is_ok() { Intervals::FittedMixture } else { Intervals::PowerLaw },
-                model: axis.fit.as_ref().ok().map(model_name),
+                model: axis.fit.as_ref().ok().map(view::allan::kinds),
             }
         })
         .collect();
@@ -290,58 +264,4 @@ fn document(axes: &[AxisCurve], deviation: Deviation, header: Header) -> Documen
         axes,
         log: header.check,
     }
-}
-
-fn text(axis: &AxisCurve, deviation: DeviationArg) -> String {
-    let (unit, points) = (&axis.unit, &axis.curve.points);
-    let rows: Vec<Vec<String>> = points
-        .iter()
-        .map(|p| {
-            vec![
-                digits(p.tau_s),
-                digits(unit.from_si(p.deviation)),
-                digits(unit.from_si(p.lower)),
-                digits(unit.from_si(p.upper)),
-                digits(p.edf),
-                p.terms.to_string(),
-                p.noise.name().into(),
-            ]
-        })
-        .collect();
-    let header = ["tau (s)", &format!("deviation ({unit})"), "95 % from", "to", "edf", "terms", "noise"];
-    let basis = match &axis.fit {
-        Ok(model) if deviation.kind() == Deviation::Totdev => {
-            format!("published formula for the dominating law of the fitted {}", model_name(model))
-        }
-        Ok(model) => format!("exact for the fitted {}", model_name(model)),
-        Err(_) => "for the power law at each tau".into(),
-    };
-    let lowest = points.iter().filter(|p| p.deviation > 0.0).min_by(|a, b| a.deviation.total_cmp(&b.deviation));
-    let lowest = lowest.map_or_else(String::new, |p| {
-        format!("Lowest: {} {unit} at {} s. ", digits(unit.from_si(p.deviation)), digits(p.tau_s))
-    });
-    let windows = match axis.curve.windows {
-        1 => String::new(),
-        windows => format!("{windows} windows of "),
-    };
-    format!(
-        "{}: {} of {windows}{} samples\n{}{lowest}Intervals: {basis}.\n",
-        axis.name,
-        deviation.kind().name(),
-        axis.curve.samples,
-        table(&header, &rows),
-    )
-}
-
-/// The curves of all axes, one above the other.
-fn sheet(log: &str, axes: &[AxisCurve]) -> String {
-    let figures: Vec<String> = axes.iter().map(figure).collect();
-    let kind = axes.first().map_or("", |axis| axis.curve.deviation.name());
-    report::figure::sheet(&format!("{log}: {kind}"), &figures)
-}
-
-/// The curve of one axis.
-pub(super) fn figure(axis: &AxisCurve) -> String {
-    let AxisCurve { name, unit, curve, fit, .. } = axis;
-    report::allan::figure(name, curve, fit.as_ref().ok(), unit)
 }

@@ -1,26 +1,23 @@
 //! `kfdesign compare`.
 
-mod sight;
-
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
 
 use super::files::{self, Kind, Output};
 use super::log_flags::{LogFlags, print_check};
-use super::output::{digits, notes, print_json, print_text, say, table};
+use super::output::{print_json, print_report, say};
 use super::stretch::stretches;
-use super::tests_table::{TESTS, caption, rows};
 use super::{Status, VerdictFlags};
 use crate::cli::checked;
 use crate::compare::parameters::parameters;
-use crate::compare::{self, AxisComparison, Beside, Comparison, Log, LogAxis};
-use crate::export::atomic;
+use crate::compare::{self, Log, LogAxis};
 use crate::import::{self, ImportError};
 use crate::params::{AxisParams, Params};
 use crate::replay::axes::partners;
 use crate::signal::LogCheck;
 use crate::units::{Quantity, Unit};
+use crate::view;
 
 /// Does a noise model fit a log that it may not come from?
 ///
@@ -162,69 +159,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
                 .into(),
         );
     }
-    if let Some(path) = &args.output {
-        let mut text = serde_json::to_string_pretty(&result)?;
-        text.push('\n');
-        atomic::write(path, text.as_bytes())?;
-    }
-    if let Some(path) = &args.plot {
-        atomic::write(path, sight::sheet(&result, &pair.unit).as_bytes())?;
-    }
-    if let Some(path) = &args.report {
-        atomic::write(path, sight::page(&result, &pair.unit).to_html()?.as_bytes())?;
-    }
+    files::write_json(args.output.as_deref(), &result)?;
+    let report = view::compare::compare(&result, &pair.unit);
+    files::write_plot(args.plot.as_deref(), "Model and log", &report)?;
+    files::write_page(args.report.as_deref(), &report)?;
     if args.json {
         print_json(&result)?;
     } else {
-        print_text(&text(&result, &pair.unit));
+        print_report(&report);
     }
     Ok(args.judging.status([result.verdict]))
-}
-
-const MEANS: [&str; 6] = ["axis", "log column", "samples", "mean of log", "simulated mean", "sigma of a mean"];
-
-/// Everything a person wants to see.
-fn text(result: &Comparison, unit: &Unit) -> String {
-    let mut out = format!(
-        "{}:\n{}",
-        caption("the model on this log", &result.tests, result.alpha),
-        table(&TESTS, &rows(&result.tests, result.alpha))
-    );
-    out += &format!("\nMeans in {unit}, which prove nothing:\n{}", table(&MEANS, &mean_rows(result, unit)));
-    if let Some(axis) = result.axes.first() {
-        out += &format!("{}: {}.\n", axis.name, axis.means.sentence);
-    }
-    if !result.parameters.is_empty() {
-        out += &format!("\n{BESIDE_CAPTION}:\n{}", table(&BESIDE, &beside_rows(result)));
-        beside_words(result).iter().for_each(|sentence| out += &format!("{sentence}.\n"));
-    }
-    out += &notes(result.axes.iter().map(|a| (a.name.as_str(), a.notes.as_slice())));
-    format!("{out}\n{}: {}\n", result.verdict.word(), result.meaning)
-}
-
-const BESIDE_CAPTION: &str = "The file's numbers beside the log's own (95 % intervals, each alone)";
-const BESIDE: [&str; 9] = ["axis", "parameter", "file", "this log", "from", "to", "unit", "file/log", "held against"];
-
-fn beside_rows(result: &Comparison) -> Vec<Vec<String>> {
-    let number = |value: Option<f64>| value.filter(|v| v.is_finite()).map_or_else(|| "-".into(), digits);
-    let row = |b: &Beside| {
-        let ends = b.interval.map_or([None; 2], |ends| ends.map(Some));
-        let cells = [Some(b.file), b.log, ends[0], ends[1]].map(number);
-        [vec![b.axis.clone(), b.parameter.clone()], cells.into(), vec![b.unit.clone(), number(b.ratio), b.how.clone()]]
-            .concat()
-    };
-    result.parameters.iter().map(row).collect()
-}
-
-/// A sentence for each number.
-fn beside_words(result: &Comparison) -> Vec<String> {
-    result.parameters.iter().map(|b| b.meaning.clone()).collect()
-}
-
-fn mean_rows(result: &Comparison, unit: &Unit) -> Vec<Vec<String>> {
-    let row = |a: &AxisComparison| {
-        let values = [a.means.real, a.means.simulated, a.means.std_dev].map(|v| digits(unit.from_si(v)));
-        [vec![a.name.clone(), a.log_axis.clone(), a.samples.to_string()], values.into()].concat()
-    };
-    result.axes.iter().map(row).collect()
 }

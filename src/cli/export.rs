@@ -9,12 +9,13 @@ use anyhow::{Context, anyhow, bail};
 use super::Status;
 use super::files::{self, Kind};
 use super::flags::with_unit;
-use super::output::{digits, print_text, say};
+use super::output::{print_report, print_text, say};
 use crate::cli::checked;
 use crate::export::atomic;
 use crate::export::consumer::{Choice, Export, Target, Walk, write};
 use crate::params::Params;
-use crate::units::{Dimension, Quantity};
+use crate::units::{Dimension, Quantity, digits};
+use crate::view;
 
 /// Noise parameters in the files and units of other programs; a filter as source code in C or Rust
 #[derive(Debug, clap::Args)]
@@ -143,7 +144,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     match &args.output {
         Some(path) => {
             atomic::write(path, written.text.as_bytes())?;
-            print_text(&format!("{} written\n", path.display()));
+            print_report(&view::export::export(&[path.display().to_string()], None));
         }
         None => print_text(&written.text),
     }

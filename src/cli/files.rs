@@ -3,8 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
+use serde::Serialize;
 
 use crate::export::atomic;
+use crate::report::{Report, html};
 
 /// Endings of pages, pictures and binary tables, which no other program reads as a text of parameters.
 const NO_TEXT: [&str; 9] = ["html", "htm", "svg", "png", "jpg", "pdf", "npy", "csv", "gz"];
@@ -86,6 +88,26 @@ pub(super) fn check(outputs: &[Output<'_>], inputs: &[&Path]) -> anyhow::Result<
         Some(pipe) => bail!("{}: it is a named pipe; save what comes out of it to a file first", pipe.display()),
         None => Ok(()),
     }
+}
+
+/// A document, where a file for it is named.
+pub(super) fn write_json<T: Serialize>(path: Option<&Path>, document: &T) -> anyhow::Result<()> {
+    let Some(path) = path else { return Ok(()) };
+    let mut text = serde_json::to_string_pretty(document)?;
+    text.push('\n');
+    Ok(atomic::write(path, text.as_bytes())?)
+}
+
+/// The figures, under `title`, where a file for them is named.
+pub(super) fn write_plot(path: Option<&Path>, title: &str, report: &Report<'_>) -> anyhow::Result<()> {
+    let Some(path) = path else { return Ok(()) };
+    Ok(atomic::write(path, report.sheet(title).as_bytes())?)
+}
+
+/// The page, where a file for it is named.
+pub(super) fn write_page(path: Option<&Path>, report: &Report<'_>) -> anyhow::Result<()> {
+    let Some(path) = path else { return Ok(()) };
+    Ok(atomic::write(path, html::page(report)?.as_bytes())?)
 }
 
 /// A pipe that has a name of its own; what a shell makes of `<(…)`, and `/dev/stdout`, have none.

@@ -1,7 +1,5 @@
 //! `kfdesign fly`.
 
-mod figures;
-
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
@@ -10,12 +8,12 @@ use anyhow::bail;
 use super::Status;
 use super::files::{self, Kind};
 use super::flags::{whole, with_unit};
-use super::output::{digits, print_json, print_text, table};
-use crate::aircraft::flight::{FlightDocument, FlightReport, Plan, RowSink, Times, fly};
-use crate::export::atomic;
+use super::output::{print_json, print_report};
+use crate::aircraft::flight::{FlightDocument, Plan, RowSink, Times, fly};
 use crate::export::table::TableWriter;
 use crate::report::figure::Envelope;
 use crate::units::Dimension;
+use crate::view;
 
 /// An airplane over time: truth and what its sensors show
 #[derive(Debug, clap::Args)]
@@ -101,15 +99,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         let writer = path.as_ref().map(|path| TableWriter::create(path, &header)).transpose()?;
         Ok(Log { path, writer, lines: (run == 0 && args.plot.is_some()).then_some(&lines) })
     };
-    let report = fly(&plan, args.seed, args.runs, open)?;
-    if let (Some(path), Ok(lines)) = (&args.plot, lines.into_inner()) {
-        let figures = figures::sheet(&report.airplane, &header, &lines, &plan.stops());
-        atomic::write(path, figures.as_bytes())?;
-    }
+    let flown = fly(&plan, args.seed, args.runs, open)?;
+    let lines = lines.into_inner().unwrap_or_default();
+    let report = view::fly::fly(&flown, &header, &lines, &plan.stops());
+    files::write_plot(args.plot.as_deref(), &format!("Flight of {}", flown.airplane), &report)?;
     if args.json {
-        print_json(&report)?;
+        print_json(&flown)?;
     } else {
-        print_text(&text(&report));
+        print_report(&report);
     }
     Ok(Status::Done)
 }
@@ -122,45 +119,4 @@ fn of_run(output: &Path, run: u64, runs: u64) -> PathBuf {
     let name = output.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let (stem, extension) = name.split_once('.').unwrap_or((&name, ""));
     output.with_file_name(format!("{stem}-{run}.{extension}"))
-}
-
-/// What moved, in degrees, over all runs.
-fn text(report: &FlightReport) -> String {
-    let mut out = String::new();
-    let shown = [
-        ("phi (rad)", "deg"),
-        ("theta (rad)", "deg"),
-        ("p (rad/s)", "deg/s"),
-        ("q (rad/s)", "deg/s"),
-        ("r (rad/s)", "deg/s"),
-        ("elevator (rad)", "deg"),
-        ("aileron (rad)", "deg"),
-        ("rudder (rad)", "deg"),
-    ];
-    let Some(first) = report.runs.first() else { return out };
-    let rows = shown.iter().filter_map(|(name, unit)| {
-        let at = first.columns.iter().position(|column| column.name == *name)?;
-        let of_runs = || report.runs.iter().map(move |run| &run.columns[at]);
-        let mean = |of: fn(&crate::aircraft::flight::ColumnReport) -> f64| {
-            of_runs().map(of).sum::<f64>() / report.runs.len() as f64
-        };
-        let least = of_runs().map(|c| c.least).fold(f64::INFINITY, f64::min);
-        let greatest = of_runs().map(|c| c.greatest).fold(f64::NEG_INFINITY, f64::max);
-        let rms = mean(|c| c.std_dev * c.std_dev).sqrt();
-        let cells = [mean(|c| c.mean), rms, least, greatest].map(|x| digits(x.to_degrees()));
-        let name = name.split(' ').next().unwrap_or(name);
-        Some([vec![format!("{name} ({unit})")], cells.to_vec()].concat())
-    });
-    out += &table(&["", "mean", "std dev", "least", "greatest"], &rows.collect::<Vec<_>>());
-    let logs: Vec<&str> = report.runs.iter().filter_map(|run| run.log.as_deref()).collect();
-    let where_ = match logs.as_slice() {
-        [] => String::new(),
-        [one] => format!("{one}: "),
-        [one, .., last] => format!("{one} … {last}: "),
-    };
-    let runs = if report.runs.len() == 1 { String::new() } else { format!("{} runs of ", report.runs.len()) };
-    out + &format!(
-        "{where_}{runs}{} s of {}, {} rows every {} s, steps of {} s, seed {}.\n",
-        report.duration_s, report.airplane, first.rows, report.every_s, report.step_s, report.seed
-    )
 }

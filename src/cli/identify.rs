@@ -1,8 +1,6 @@
 //! `kfdesign identify`.
 
 mod checks;
-mod sight;
-pub(super) mod tables;
 mod temperature;
 mod windows;
 mod words;
@@ -16,23 +14,25 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::Status;
-use super::allan::AxisCurve;
 use super::files::{self, Kind};
 use super::log_flags::{LogFlags, print_check};
-use super::output::{digits, duration, print_json, print_text, progress, say, table};
+use super::output::{print_json, print_report, progress, say};
 use super::stretch::{Stretch, stretches};
+use crate::allan::AxisCurve;
 use crate::allan::wavelet::{self, Level};
 use crate::export::atomic;
 use crate::identify::graphical::Step;
 use crate::identify::{
-    Between, Candidate, Hold, HoldCost, Identified, Method, ModelChoice, Precision, SharedTime, Tails, TimeProfile,
-    identify_axis, identify_logs, parse_model, recent, shared_time,
+    Between, Candidate, Hold, HoldCost, Identified, IdentifiedAxis, Method, ModelChoice, OnTemperature, Precision,
+    SharedTime, Tails, TemperatureDocument, TimeProfile, identify_axis, identify_logs, parse_model, recent,
+    shared_time,
 };
 use crate::input::{InputKind, LogOptions, TemperatureColumn};
-use crate::params::{NotIdentified, Params, Source};
+use crate::params::{Params, Source};
 use crate::replay::axes::RATE_TOLERANCE;
 use crate::signal::{LogCheck, Recording};
-use crate::units::{Quantity, amount};
+use crate::units::{Quantity, amount, digits};
+use crate::view;
 
 /// Noise parameters from a log at rest, with intervals
 ///
@@ -108,9 +108,6 @@ impl MethodArg {
     }
 }
 
-/// Below this p-value the axes have different correlation times.
-const SAME_TIME: f64 = 0.01;
-
 /// What `identify --json` prints.
 #[derive(Debug, Serialize, JsonSchema)]
 pub(super) struct Document<'a> {
@@ -159,7 +156,7 @@ struct AxisDocument<'a> {
     hold: Option<&'a HoldCost>,
     /// Likelihood only, where the log has a temperature.
     #[serde(skip_serializing_if = "Option::is_none")]
-    temperature: Option<temperature::Document<'a>>,
+    temperature: Option<TemperatureDocument<'a>>,
     /// Excess kurtosis of the whitened log, which the intervals of the coefficients know; with --robust the law of the noise, where it has tails.
     tails: Tails,
     /// Of several logs: whether each parameter is the same in all.
@@ -193,16 +190,6 @@ struct CurveDocument {
     upper: Vec<f64>,
     edf: Vec<f64>,
     model: Vec<f64>,
-}
-
-/// One axis as read and as identified.
-struct Axis {
-    measured: AxisCurve,
-    /// Samples of the log that are not among those on which the terms were chosen, and how many of these are filled in.
-    left_out: usize,
-    filled: usize,
-    found: Identified,
-    warmth: Option<temperature::Shown>,
 }
 
 /// What is said of the log, or the logs, as a whole.
@@ -281,27 +268,28 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if let Some(path) = &args.output {
         atomic::write(path, params.to_json().as_bytes())?;
     }
-    if let Some(path) = &args.plot {
-        atomic::write(path, sight::sheet(&log.name, &axes).as_bytes())?;
-    }
-    if let Some(path) = &args.report {
-        atomic::write(path, sight::page(&params, &axes)?.as_bytes())?;
-    }
     let profiles: Vec<&TimeProfile> = axes.iter().filter_map(|axis| axis.found.time_profile.as_ref()).collect();
     let shared = (profiles.len() == axes.len()).then(|| shared_time(&profiles)).flatten();
+    let report = view::identify::identify(&params, &axes, shared.as_ref());
+    let title = format!("{}: overlapping Allan deviation", log.name);
+    files::write_plot(args.plot.as_deref(), &title, &report)?;
+    files::write_page(args.report.as_deref(), &report)?;
     if args.json {
         let document = document(&params, &axes, &log, args.method.method());
         print_json(&Document { shared_correlation_time: shared, ..document })?;
     } else {
-        let mut text: Vec<String> = axes.iter().map(|axis| text(axis, params.quantity)).collect();
-        text.extend(shared.as_ref().map(shared_words));
-        print_text(&text.join("\n"));
+        print_report(&report);
     }
     Ok(checks::status(&params, args.output.as_deref()))
 }
 
 /// The logs in memory at once.
-fn whole(args: &Args, choice: &ModelChoice, holds: &[Hold], options: &LogOptions) -> anyhow::Result<(Log, Vec<Axis>)> {
+fn whole(
+    args: &Args,
+    choice: &ModelChoice,
+    holds: &[Hold],
+    options: &LogOptions,
+) -> anyhow::Result<(Log, Vec<IdentifiedAxis>)> {
     let mut readings = Vec::with_capacity(args.logs.len());
     for log in &args.logs {
         let (recording, check) = crate::input::read(log, options)?;
@@ -328,13 +316,13 @@ fn whole(args: &Args, choice: &ModelChoice, holds: &[Hold], options: &LogOptions
     if parts.is_empty() {
         bail!("{}: no axis to work on", args.logs[0].display());
     }
-    let warmth = temperature::Warmth::new(&readings, options.kind);
+    let temperature = temperature::Temperature::new(&readings, options.kind);
     let bar = progress(parts.len() as u64, "identify");
-    let axes: Vec<Axis> = parts
+    let axes: Vec<IdentifiedAxis> = parts
         .into_par_iter()
         .map(|part| {
             let holds = holds_of(holds, &part[0].name, &names);
-            let axis = identify(part, dt, args, &Wanted { choice, holds: &holds }, &log, warmth.as_ref());
+            let axis = identify(part, dt, args, &Wanted { choice, holds: &holds }, &log, temperature.as_ref());
             bar.inc(1);
             axis
         })
@@ -422,8 +410,8 @@ fn identify(
     args: &Args,
     wanted: &Wanted<'_>,
     log: &Log,
-    warmth: Option<&temperature::Warmth>,
-) -> anyhow::Result<Axis> {
+    of_logs: Option<&temperature::Temperature>,
+) -> anyhow::Result<IdentifiedAxis> {
     // the integral and the Allan curve want every sample as it was
     if args.method == MethodArg::Likelihood {
         parts.iter_mut().for_each(Stretch::bridge);
@@ -448,8 +436,8 @@ fn identify(
     }
     let changes = found.fitted.as_ref().and_then(|fitted| recent(&part.rate, dt, fitted));
     found.warnings.extend(changes.map(|recent| words::change_words(&recent, part, dt)));
-    let warmth = warmth.zip(found.fitted.as_ref()).map(|(warmth, fitted)| warmth.shown(fitted, &parts, longest, dt));
-    found.params.temperature = warmth.as_ref().and_then(temperature::Shown::record);
+    let temperature = of_logs.zip(found.fitted.as_ref()).map(|(all, fitted)| all.against(fitted, &parts, longest, dt));
+    found.params.temperature = temperature.as_ref().and_then(OnTemperature::record);
     if dropped > 0 {
         found.warnings.push(format!("{dropped} outliers were left out"));
     }
@@ -460,11 +448,11 @@ fn identify(
     let role = if method == Method::Likelihood { "chooses the terms" } else { "is used" };
     let note = part.left_out_note(role);
     let measured = AxisCurve { name: part.name.clone(), unit: part.unit.clone(), note, curve, fit };
-    Ok(Axis { measured, left_out: part.left_out, filled: part.filled, found, warmth })
+    Ok(IdentifiedAxis { measured, left_out: part.left_out, filled: part.filled, found, temperature })
 }
 
-fn wavelets(axis: &Axis) -> WaveletDocument {
-    let Axis { measured, found, .. } = axis;
+fn wavelets(axis: &IdentifiedAxis) -> WaveletDocument {
+    let IdentifiedAxis { measured, found, .. } = axis;
     let unit = &measured.unit;
     let square = |si: f64| unit.from_si(unit.from_si(si));
     let levels = wavelet::levels(&found.curve);
@@ -479,9 +467,9 @@ fn wavelets(axis: &Axis) -> WaveletDocument {
     }
 }
 
-fn document<'a>(params: &'a Params, axes: &'a [Axis], log: &'a Log, method: Method) -> Document<'a> {
-    let axis = |axis: &'a Axis| {
-        let Axis { measured, found, .. } = axis;
+fn document<'a>(params: &'a Params, axes: &'a [IdentifiedAxis], log: &'a Log, method: Method) -> Document<'a> {
+    let axis = |axis: &'a IdentifiedAxis| {
+        let IdentifiedAxis { measured, found, .. } = axis;
         let points = &found.curve.points;
         let unit = &measured.unit;
         CurveDocument {
@@ -510,7 +498,7 @@ fn document<'a>(params: &'a Params, axes: &'a [Axis], log: &'a Log, method: Meth
         steps: &a.found.steps,
         warnings: &a.found.warnings,
         hold: a.found.hold.as_ref(),
-        temperature: a.warmth.as_ref().map(temperature::Shown::document),
+        temperature: a.temperature.as_ref().map(OnTemperature::document),
         tails: a.found.tails,
         between_logs: &a.found.between,
         allan: axis(a),
@@ -526,95 +514,4 @@ fn document<'a>(params: &'a Params, axes: &'a [Axis], log: &'a Log, method: Meth
         further_logs: logs.collect(),
         shared_correlation_time: None,
     }
-}
-
-/// Whether the axes have one correlation time.
-fn shared_words(shared: &SharedTime) -> String {
-    let limit = |limit: Option<f64>| limit.map_or("open".into(), digits);
-    format!(
-        "One correlation time for all axes: {} s ({} … {}); likelihood ratio {}, p = {}: {}\n",
-        digits(shared.correlation_time_s),
-        limit(shared.lower_s),
-        limit(shared.upper_s),
-        digits(shared.likelihood_ratio),
-        digits(shared.p_value),
-        if shared.p_value < SAME_TIME { "the axes differ" } else { "the log does not tell the axes apart" }
-    )
-}
-
-const STEPS: [&str; 4] = ["step", "formula", "value", "unit"];
-
-/// Everything a person wants to see of one axis.
-fn text(axis: &Axis, quantity: Quantity) -> String {
-    let parameters = tables::parameters(axis, quantity);
-    let mut out = format!("{}\n{}", headline(axis), table(parameters.header, &parameters.rows));
-    if let Some(hold) = &axis.found.hold {
-        out += &format!("{}\n", hold.sentence());
-    }
-    if let Some(candidates) = tables::candidates(&axis.found.candidates) {
-        out += &format!("\n{}:\n{}", candidates.caption, table(candidates.header, &candidates.rows));
-    }
-    if !axis.found.steps.is_empty() {
-        out += &format!("\nThe recipe, step by step:\n{}", table(&STEPS, &step_rows(&axis.found.steps)));
-        out += "What each step costs:\n";
-        for sentence in costs(&axis.found.steps) {
-            out += &format!("  {sentence}\n");
-        }
-    }
-    if let Some(warmth) = &axis.warmth {
-        out += &format!("\n{}\n", warmth.sentences().join("\n"));
-        if let Some(pairs) = warmth.table() {
-            out += &format!("{}:\n{}", pairs.caption, table(pairs.header, &pairs.rows));
-        }
-    }
-    if !axis.found.between.is_empty() {
-        let each = axis.found.between.iter().map(|own| format!("{} p = {}", own.parameter, digits(own.p_value)));
-        out += &format!("\nWhether the logs are alike: {}\n", each.collect::<Vec<_>>().join(", "));
-    }
-    if !axis.found.not_identified.is_empty() {
-        out += "\nNot identified:\n";
-        for sentence in axis.found.not_identified.iter().map(not_identified) {
-            out += &format!("  {sentence}\n");
-        }
-    }
-    for warning in &axis.found.warnings {
-        out += &format!("warning: {warning}\n");
-    }
-    out
-}
-
-/// "gyro_x: white+gm, 720000 samples in 2 h".
-fn headline(axis: &Axis) -> String {
-    let found = &axis.found;
-    let samples = found.samples;
-    let span = duration(samples as f64 * found.curve.dt);
-    match found.candidates.iter().find(|c| c.chosen) {
-        Some(chosen) => {
-            let used = match found.first_tau_s {
-                Some(tau) => format!(", averaging times from {} s", digits(tau)),
-                None => String::new(),
-            };
-            let (name, p) = (&found.params.name, digits(found.fit_p_value));
-            format!("{name}: {} from {samples} samples ({span}); fit p = {p}{used}", chosen.model)
-        }
-        None => format!("{}: the graphical recipe on {samples} samples ({span})", found.params.name),
-    }
-}
-
-fn step_rows(steps: &[Step]) -> Vec<Vec<String>> {
-    let row = |s: &Step| {
-        let value = s.value.map_or("-".to_string(), digits);
-        vec![s.what.clone(), s.formula.clone(), value, s.unit.clone()]
-    };
-    steps.iter().map(row).collect()
-}
-
-fn costs(steps: &[Step]) -> Vec<String> {
-    steps.iter().map(|s| format!("{}: {}", s.what, s.cost)).collect()
-}
-
-fn not_identified(entry: &NotIdentified) -> String {
-    let needed =
-        entry.needed_log_s.map_or_else(String::new, |s| format!("; a log of about {} would tell", duration(s)));
-    format!("{}: {}{needed}", entry.term, entry.reason)
 }

@@ -6,12 +6,11 @@ use anyhow::bail;
 
 use super::Status;
 use super::files::{self, Kind};
-use super::identify::tables::term_rows;
-use super::output::{digits, print_json, print_text, say, table};
+use super::output::{print_json, print_report, say};
 use crate::export::atomic;
 use crate::import::{self, Imported};
-use crate::params::Params;
 use crate::units::Quantity;
+use crate::view;
 
 /// Noise parameters from the files of other programs
 ///
@@ -67,52 +66,17 @@ pub(super) fn finish(
     for warning in &found.warnings {
         say(&format!("  warning: {warning}"));
     }
-    let mut written = String::new();
+    let mut report = view::import::import(found);
     for (path, params) in [(output, Some(first)), (accelerometer, of_force)] {
         if let (Some(path), Some(params)) = (path, params) {
             atomic::write(path, params.to_json().as_bytes())?;
-            written += &format!("{} written: {}\n", path.display(), params.quantity.name());
+            report.written.push(format!("{} written: {}", path.display(), params.quantity.name()));
         }
     }
     if json {
         print_json(first)?;
     } else {
-        print_text(&format!("{}{written}", text(found)));
+        print_report(&report);
     }
     Ok(Status::Done)
-}
-
-/// Everything a person wants to see.
-fn text(found: &Imported) -> String {
-    let rates: Vec<String> =
-        found.sensors.iter().map(|p| format!("{} at {} Hz", p.quantity.name(), digits(p.sample_rate_hz))).collect();
-    let mut out = format!("{}: {}\n", found.origin, rates.join(", "));
-    let rows: Vec<Vec<String>> = found.sensors.iter().flat_map(rows).collect();
-    out += &table(&["axis", "parameter", "value", "unit", "also"], &rows);
-    out.push('\n');
-    found.rules.iter().for_each(|rule| out += &format!("{rule}.\n"));
-    out
-}
-
-/// Axes that are alike in one row.
-fn rows(params: &Params) -> Vec<Vec<String>> {
-    let mut groups: Vec<(String, Vec<Vec<String>>)> = Vec::new();
-    for axis in &params.axes {
-        let spread =
-            axis.turn_on_bias.iter().map(|v| ("turn-on bias sigma", v)).chain(axis.bias.iter().map(|v| ("bias", v)));
-        let own: Vec<Vec<String>> = term_rows(&axis.terms, params.quantity, params.sample_rate_hz)
-            .into_iter()
-            // a file has no intervals
-            .map(|row| [&row[..2], &row[4..]].concat())
-            .chain(spread.map(|(name, v)| vec![name.into(), digits(v.value), v.unit.to_string(), String::new()]))
-            .collect();
-        match groups.iter_mut().find(|(_, rows)| *rows == own) {
-            Some((names, _)) => *names += &format!(",{}", axis.name),
-            None => groups.push((axis.name.clone(), own)),
-        }
-    }
-    groups
-        .into_iter()
-        .flat_map(|(names, rows)| rows.into_iter().map(move |row| [vec![names.clone()], row].concat()))
-        .collect()
 }

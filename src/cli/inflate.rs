@@ -8,10 +8,10 @@ use super::Status;
 use super::compare::read;
 use super::files::Kind;
 use super::log_flags::LogFlags;
-use super::output::{digits, notes, print_json, print_text, table};
-use crate::compare::inflation::{AxisInflation, Inflation, inflated, inflation, usual_from_hz};
+use super::output::{print_json, print_report};
+use crate::compare::inflation::{inflated, inflation, usual_from_hz};
 use crate::export::atomic;
-use crate::units::Unit;
+use crate::view;
 
 /// How many times louder than on the bench: the factor that vibration puts on white noise
 ///
@@ -56,49 +56,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if args.json {
         print_json(&found)?;
     } else {
-        print_text(&text(&found, &pair.unit));
+        print_report(&view::inflate::inflate(&found, &pair.unit));
     }
     Ok(Status::Done)
-}
-
-/// Everything a person wants to see.
-fn text(found: &Inflation, unit: &Unit) -> String {
-    let density = unit.times_time(1);
-    let row = |a: &AxisInflation| {
-        let [low, high] = a.interval;
-        let [robust_low, robust_high] = a.robust_interval;
-        let numbers = [a.factor, low, high, a.robust_factor, robust_low, robust_high].map(digits);
-        let densities = [a.density, a.density * a.factor].map(|n| digits(density.from_si(n)));
-        [vec![a.name.clone(), a.log_axis.clone(), a.samples.to_string()], numbers.into(), densities.into()].concat()
-    };
-    let header = [
-        "axis",
-        "log column",
-        "samples",
-        "factor",
-        "95 % from",
-        "to",
-        "by median",
-        "95 % from",
-        "to",
-        "bench N",
-        "here",
-    ];
-    let mut out = format!(
-        "Noise above {} Hz over that of the parameters, as a factor on the density (N in {density}):\n{}",
-        digits(found.from_hz),
-        table(&header, &found.axes.iter().map(row).collect::<Vec<_>>())
-    );
-    let lines: Vec<Vec<String>> = found
-        .axes
-        .iter()
-        .flat_map(|a| a.lines.iter().map(move |l| (a, l)))
-        .map(|(a, l)| vec![a.name.clone(), digits(l.frequency_hz), digits(l.width_hz), digits(unit.from_si(l.std_dev))])
-        .collect();
-    if !lines.is_empty() {
-        let sigma = format!("sigma ({unit})");
-        out += &format!("\nLines:\n{}", table(&["axis", "frequency (Hz)", "width (Hz)", &sigma], &lines));
-    }
-    out += &notes(found.axes.iter().map(|a| (a.name.as_str(), a.notes.as_slice())));
-    format!("{out}\nValid for {}.\n", found.valid_for)
 }

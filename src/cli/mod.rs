@@ -28,7 +28,6 @@ pub mod schema;
 pub mod simulate;
 mod stop;
 mod stretch;
-mod tests_table;
 pub mod trim;
 pub mod tune;
 mod windows;

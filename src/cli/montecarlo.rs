@@ -1,8 +1,6 @@
 //! `kfdesign montecarlo` and `kfdesign merge`.
 
-mod sight;
 mod tables;
-mod text;
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -13,7 +11,7 @@ use anyhow::{Context, bail};
 
 use super::files::{self, Kind};
 use super::flags::{whole, with_unit};
-use super::output::{digits, print_text, progress, with_bar};
+use super::output::{print_report, print_text, progress, with_bar};
 use super::{Status, Stop, VerdictFlags};
 use crate::cli::checked;
 use crate::export::{atomic, junit};
@@ -25,7 +23,9 @@ use crate::montecarlo::experiment::default_steps;
 use crate::montecarlo::gate::Gate;
 use crate::montecarlo::power::{self, Mistuning};
 use crate::montecarlo::{Course, Experiment, Outcome, Runs, Totals, conclude};
-use crate::units::Dimension;
+use crate::units::{Dimension, digits};
+use crate::view;
+use crate::view::montecarlo::MonteCarlo;
 
 /// Time between two writes of unfinished work.
 const CHECKPOINT: Duration = Duration::from_secs(20);
@@ -347,9 +347,9 @@ impl Outputs {
             }
         }
         let detects = experiment.truth.is_none() || self.power;
-        let mut planned = String::new();
+        let mut plans = Vec::new();
         if detects || !self.plan.is_empty() {
-            planned = self.look(experiment, course, &gate, detects, &mut outcome)?;
+            plans = self.look(experiment, course, &gate, detects, &mut outcome)?;
         }
         let json = document::to_json(experiment, &outcome, totals);
         if let Some(path) = &self.output {
@@ -358,28 +358,25 @@ impl Outputs {
         if let Some(path) = &self.junit {
             atomic::write(path, junit::report(&outcome)?.as_bytes())?;
         }
-        if let Some(path) = &self.report {
+        if self.report.is_some() && !detects {
             // the page always has the table; what the document holds does not depend on the page
-            let mut seen = outcome.clone();
-            if !detects {
-                let (course, gate) = as_own_truth(experiment, course, &gate, count)?;
-                seen.detects = power::detectable(experiment, &course, &gate, count);
-            }
-            let page = sight::page(&sight::View { experiment, course, outcome: &seen, sources });
-            atomic::write(path, page.to_html()?.as_bytes())?;
+            let (course, gate) = as_own_truth(experiment, course, &gate, count)?;
+            outcome.detects = power::detectable(experiment, &course, &gate, count);
         }
+        let view = MonteCarlo { experiment, course, outcome: &outcome, sources, power: self.power, plans: &plans };
+        let report = view::montecarlo::montecarlo(view);
+        files::write_page(self.report.as_deref(), &report)?;
         if self.json {
             print_text(&json);
         } else {
-            let power = if self.power { text::power(&outcome) } else { String::new() };
-            print_text(&format!("{power}{planned}{}", text::outcome(&outcome)));
+            print_report(&report);
         }
         Ok(self.judging.status([outcome.verdict]))
     }
 }
 
 impl Outputs {
-    /// What the gate sees when the design is wrong, into the outcome if `detects` says so; the plans as text.
+    /// What the gate sees when the design is wrong, into the outcome if `detects` says so; the plans in words.
     fn look(
         &self,
         experiment: &Experiment,
@@ -387,7 +384,7 @@ impl Outputs {
         gate: &Gate,
         detects: bool,
         outcome: &mut Outcome,
-    ) -> anyhow::Result<String> {
+    ) -> anyhow::Result<Vec<String>> {
         let runs = outcome.runs.count();
         let (course, gate) = as_own_truth(experiment, course, gate, runs)?;
         let (course, gate) = (course.as_ref(), gate.as_ref());
@@ -402,12 +399,11 @@ impl Outputs {
             let bar = progress((self.confirm * runs).saturating_mul(sizes as u64), "confirm");
             with_bar(bar, || power::confirm(experiment, course, gate, runs, self.confirm, &mut outcome.detects))??;
         }
-        let mut text = String::new();
-        for (number, what, size, wished) in plans {
+        let plan = |(number, what, size, wished): (usize, Mistuning, f64, &str)| {
             let needed = power::plan(experiment, course, gate, runs, number, &what, size)?;
-            text.push_str(&text::plan(outcome, wished, &needed));
-        }
-        Ok(text)
+            Ok(view::montecarlo::plan(outcome, wished, &needed))
+        };
+        plans.into_iter().map(plan).collect()
     }
 }
 

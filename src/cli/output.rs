@@ -1,4 +1,4 @@
-//! Tables, JSON, progress: how every command speaks.
+//! What every command writes to stdout and stderr: reports, documents, notes, progress.
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -11,10 +11,7 @@ use serde::Serialize;
 
 use crate::export::atomic::in_words;
 use crate::numerics::progress::{Progress, Stopped, watched};
-use crate::params::{AxisParams, Params};
-use crate::replay::axes::RATE_TOLERANCE;
-pub use crate::units::digits;
-use crate::units::{Quantity, Unit};
+use crate::report::{Level, Report, terminal};
 
 /// Why stdout did not take all that was meant for it.
 static LOST: OnceLock<String> = OnceLock::new();
@@ -74,14 +71,15 @@ fn print(text: &str) {
     }
 }
 
+/// A report for a person: as wide as the terminal, with every column and whole lines where stdout is none.
+pub fn print_report(report: &Report<'_>) {
+    let width = terminal_size::terminal_size_of(std::io::stdout()).map(|(width, _)| usize::from(width.0));
+    print_text(&terminal::text(report, Level::Full, width));
+}
+
 /// A line on stderr. Who does not listen misses it.
 pub fn say(line: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{}", with_flags(line));
-}
-
-/// The same of several lines, each with its end.
-pub fn say_all(lines: &str) {
-    lines.lines().for_each(say);
 }
 
 /// The help of clap, coloured for a terminal.
@@ -99,16 +97,6 @@ pub fn exit_status(work: u8) -> u8 {
             2
         }
         _ => work,
-    }
-}
-
-/// Seconds below two minutes, minutes below two hours, hours below a thousand of them, else days.
-pub fn duration(seconds: f64) -> String {
-    match seconds {
-        s if s < 120.0 => format!("{} s", digits(s)),
-        s if s < 7200.0 => format!("{} min", digits(s / 60.0)),
-        s if s < 3.6e6 => format!("{} h", digits(s / 3600.0)),
-        s => format!("{} days", digits(s / 86_400.0)),
     }
 }
 
@@ -135,81 +123,6 @@ pub fn with_bar<T: Send>(bar: ProgressBar, work: impl FnOnce() -> T + Send) -> R
     let done = watched(&watch, work);
     bar.finish_and_clear();
     done
-}
-
-/// "note: x, y: …" for what is said of each name, each sentence once.
-pub fn notes<'a>(said: impl Iterator<Item = (&'a str, &'a [String])>) -> String {
-    let mut found: Vec<(&str, Vec<&str>)> = Vec::new();
-    for (name, sentences) in said {
-        for sentence in sentences {
-            match found.iter_mut().find(|(other, _)| other == sentence) {
-                Some((_, names)) => names.push(name),
-                None => found.push((sentence, vec![name])),
-            }
-        }
-    }
-    found.iter().map(|(sentence, names)| format!("note: {}: {sentence}\n", names.join(", "))).collect()
-}
-
-/// What a rate other than that of the parameters makes of the terms that count samples, "x, y: …", each sentence once.
-pub fn notes_of_rate(params: &Params, axes: &[&AxisParams], rate_hz: f64) -> String {
-    if (rate_hz / params.sample_rate_hz - 1.0).abs() <= RATE_TOLERANCE {
-        return String::new();
-    }
-    let sentence = |axis: &AxisParams| {
-        let counted = axis.noise().of_samples()?;
-        Some(format!(
-            "{counted} belongs to the samples at {} Hz: at {} Hz the same coefficients are another process (the corner of a filter moves with the rate)",
-            digits(params.sample_rate_hz),
-            digits(rate_hz)
-        ))
-    };
-    let said: Vec<(&str, Vec<String>)> =
-        axes.iter().map(|axis| (axis.name.as_str(), sentence(axis).into_iter().collect())).collect();
-    notes(said.iter().map(|(name, sentences)| (*name, sentences.as_slice())))
-}
-
-/// A text table: first column left, the others right aligned, two spaces between.
-pub fn table(header: &[&str], rows: &[Vec<String>]) -> String {
-    let columns = header.len();
-    let mut width: Vec<usize> = header.iter().map(|h| h.chars().count()).collect();
-    for row in rows {
-        for (w, cell) in width.iter_mut().zip(row) {
-            *w = (*w).max(cell.chars().count());
-        }
-    }
-    let mut out = String::new();
-    let header: Vec<String> = header.iter().map(|h| (*h).to_string()).collect();
-    for row in std::iter::once(&header).chain(rows) {
-        let mut line = String::new();
-        for (i, (cell, w)) in row.iter().zip(&width).enumerate() {
-            let pad = " ".repeat(w - cell.chars().count());
-            let last = i + 1 == columns;
-            match (i == 0, last) {
-                (true, true) => line.push_str(cell),
-                (true, false) => line.push_str(&format!("{cell}{pad}  ")),
-                (false, true) => line.push_str(&format!("{pad}{cell}")),
-                (false, false) => line.push_str(&format!("{pad}{cell}  ")),
-            }
-        }
-        out.push_str(line.trim_end());
-        out.push('\n');
-    }
-    out
-}
-
-/// That of the quantity is shown in the unit of the axis, its integral and its derivative (an angle, an acceleration) in the unit that
-/// goes with it, others in SI: scale and text.
-pub fn shown_unit(si: &str, quantity: Quantity, unit: &Unit) -> (f64, String) {
-    if si == quantity.si_unit() {
-        return (unit.scale(), unit.to_string());
-    }
-    let dimension = Unit::parse(si).map(|si| si.dimension());
-    let family = [2, -2].map(|half_powers| unit.times_time(half_powers));
-    match family.into_iter().find(|unit| dimension == Ok(unit.dimension())) {
-        Some(unit) => (unit.scale(), unit.to_string()),
-        None => (1.0, si.to_owned()),
-    }
 }
 
 #[cfg(test)]

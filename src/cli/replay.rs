@@ -1,9 +1,7 @@
 //! `kfdesign replay`.
 
 mod attitude;
-mod sight;
 
-use crate::signal::check::FindingKind;
 use std::path::PathBuf;
 
 use anyhow::Context;
@@ -12,18 +10,17 @@ use super::aid_columns::aid_columns;
 use super::files::{self, Kind};
 use super::flags::with_unit;
 use super::log_flags::{LogFlags, print_check};
-use super::output::{digits, print_json, print_text, progress, say, shown_unit, table};
-use super::tests_table::{TESTS, caption, rows};
+use super::output::{print_json, print_report, progress, say};
 use super::{Status, VerdictFlags};
 use crate::cli::checked;
 use crate::consistency::{Test, TestKind};
-use crate::export::atomic;
 use crate::export::table::TableWriter;
 use crate::filter::{AttitudeDesign, FilterDesign, Form};
-use crate::identify::Followed;
 use crate::input::{Block, LogOptions, LogReader};
-use crate::replay::{AxisResult, Estimates, LogShape, Options, ReplayResult, Replayer};
-use crate::units::{Dimension, Quantity, Unit};
+use crate::replay::{Estimates, LogShape, Options, ReplayResult, Replayer};
+use crate::signal::check::FindingKind;
+use crate::units::Dimension;
+use crate::view;
 
 /// A recorded log through filter.json, with a verdict
 ///
@@ -141,17 +138,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         say_follow(args, &result);
     }
     let unit = reader.axes().first().map(|a| a.unit.clone());
-    if let Some(path) = &args.plot {
-        atomic::write(path, sight::sheet(&result, unit.as_ref()).as_bytes())?;
-    }
-    if let Some(path) = &args.report {
-        let page = sight::page(&result, &args.filter.display().to_string(), unit.as_ref());
-        atomic::write(path, page.to_html()?.as_bytes())?;
-    }
+    let report = view::replay::replay(&result, &args.filter.display().to_string(), unit.as_ref());
+    files::write_plot(args.plot.as_deref(), "Replay", &report)?;
+    files::write_page(args.report.as_deref(), &report)?;
     if args.json {
         print_json(&result)?;
     } else {
-        print_text(&text(&result, unit.as_ref()));
+        print_report(&report);
     }
     Ok(args.judging.status([result.verdict]))
 }
@@ -287,87 +280,4 @@ fn columns(estimates: &Estimates, innovations: bool) -> Vec<&[f64]> {
         }
     }
     columns
-}
-
-const COUNTS: [&str; 9] =
-    ["axis", "log column", "samples", "accepted", "gaps", "missing", "unusable", "rejected", "log-likelihood"];
-const STATES: [&str; 5] = ["axis", "of", "estimate", "sigma", "unit"];
-
-/// Everything a person wants to see.
-fn text(result: &ReplayResult, unit: Option<&Unit>) -> String {
-    let states = table(&STATES, &state_rows(result, unit));
-    let tests = if result.tests.is_empty() {
-        "\nToo few samples for any test.\n".to_string()
-    } else {
-        format!(
-            "\n{}:\n{}",
-            caption("the innovations", &result.tests, result.alpha),
-            table(&TESTS, &rows(&result.tests, result.alpha))
-        )
-    };
-    let followed = follow_rows(result);
-    let followed = match followed.is_empty() {
-        true => String::new(),
-        false => format!("\n{FOLLOWED_CAPTION}:\n{}", table(&FOLLOWED, &followed)),
-    };
-    format!(
-        "{}\nEstimates at the end of the log, with the filter's own sigma:\n{states}{followed}{tests}\n{}: {}\n",
-        table(&COUNTS, &count_rows(result)),
-        result.verdict.word(),
-        result.meaning
-    )
-}
-
-fn count_rows(result: &ReplayResult) -> Vec<Vec<String>> {
-    let row = |a: &AxisResult| {
-        let counts = [a.samples, a.accepted, a.gaps, a.missing, a.unusable, a.rejected].map(|n| n.to_string());
-        let mut row = vec![a.name.clone(), a.log_axis.clone()];
-        row.extend(counts);
-        row.push(format!("{:.3}", a.log_likelihood));
-        row
-    };
-    result.axes.iter().map(row).collect()
-}
-
-const FOLLOWED_CAPTION: &str = "Noise that was followed, SI";
-const FOLLOWED: [&str; 5] = ["axis", "parameter", "design", "end of the log", "unit"];
-
-fn follow_rows(result: &ReplayResult) -> Vec<Vec<String>> {
-    let of = |axis: &AxisResult| {
-        let name = axis.name.clone();
-        let parameters = axis.follow.iter().flat_map(|follow| &follow.parameters);
-        let row = move |p: &Followed| {
-            vec![name.clone(), p.parameter.clone(), digits(p.design), digits(p.now), p.unit.clone()]
-        };
-        parameters.map(row).collect::<Vec<_>>()
-    };
-    result.axes.iter().flat_map(of).collect()
-}
-
-/// The whole estimate of each axis, and its states where they are few; all are in the JSON document. Measurements of one axis share them.
-fn state_rows(result: &ReplayResult, unit: Option<&Unit>) -> Vec<Vec<String>> {
-    let mut rows: Vec<Vec<String>> = Vec::new();
-    for axis in &result.axes {
-        let few = if axis.final_state.len() <= 3 || axis.of_plant { axis.final_state.as_slice() } else { &[] };
-        let whole = Some(&axis.final_output).filter(|_| !axis.of_plant);
-        for state in whole.into_iter().chain(few) {
-            let (value, sigma, shown) = in_log_unit(state.value, state.sigma, &state.unit, result.quantity, unit);
-            let row = vec![axis.axis.clone(), state.name.clone(), digits(value), digits(sigma), shown];
-            if !rows.contains(&row) {
-                rows.push(row);
-            }
-        }
-    }
-    rows
-}
-
-/// States of the measured quantity are shown in the log's unit, angles in the one that goes with it, others as they are.
-fn in_log_unit(value: f64, sigma: f64, si: &str, quantity: Quantity, log: Option<&Unit>) -> (f64, f64, String) {
-    match log.filter(|u| u.dimension() == quantity.dimension()) {
-        Some(unit) => {
-            let (scale, text) = shown_unit(si, quantity, unit);
-            (value / scale, sigma / scale, text)
-        }
-        None => (value, sigma, si.to_string()),
-    }
 }

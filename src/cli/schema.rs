@@ -2,7 +2,7 @@
 
 use clap::ValueEnum;
 
-use super::{Status, allan, identify, output, plan, simulate, tune};
+use super::{Status, allan, identify, output, tune};
 use crate::aircraft::airframe::AirplaneDocument;
 use crate::aircraft::airframe::check::AirplaneCheck;
 use crate::aircraft::control::document::LinearDocument;
@@ -11,11 +11,13 @@ use crate::compare::Comparison;
 use crate::compare::designs::Ranking;
 use crate::compare::inflation::Inflation;
 use crate::filter::{AttitudeDesign, FilterDesign};
+use crate::identify::log_plan::LogPlan;
 use crate::input::inspect::Inventory;
 use crate::montecarlo;
 use crate::params::Params;
 use crate::replay::ReplayResult;
 use crate::replay::attitude::AttitudeReplay;
+use crate::simulate::Summary;
 
 /// The JSON schema of a document
 #[derive(Debug, clap::Args)]
@@ -89,8 +91,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         Document::Info => printed::<Inventory>(),
         Document::Allan => printed::<allan::Document>(),
         Document::Identify => printed::<identify::Document<'_>>(),
-        Document::Plan => printed::<plan::Document<'_>>(),
-        Document::Simulation => printed::<simulate::Summary>(),
+        Document::Plan => printed::<LogPlan>(),
+        Document::Simulation => printed::<Summary>(),
         Document::Tune => printed::<tune::Printed<'_>>(),
         Document::TuneAttitude => printed::<tune::attitude::Printed<'_>>(),
         Document::Ranking => printed::<Ranking>(),

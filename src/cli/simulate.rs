@@ -3,21 +3,20 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
-use schemars::JsonSchema;
-use serde::Serialize;
 
 use super::Status;
 use super::files::{self, Kind};
 use super::flags::{whole, with_unit};
-use super::output::{digits, notes_of_rate, print_json, print_text, progress, say_all, shown_unit, table};
+use super::output::{print_json, print_report, progress, say};
 use super::tune::plant_flags::PlantFlags;
 use crate::cli::checked;
 use crate::export::table::TableWriter;
 use crate::input::{self, LogOptions};
 use crate::numerics::reduce::Moments;
 use crate::params::{AxisParams, Design, Params, PlantEntry, TermEntry};
-use crate::simulate::{AxisBlock, Flight, FlightBlock, Scenario, Simulator, TrueRate};
-use crate::units::{Dimension, Quantity, Unit};
+use crate::simulate::{AxisBlock, AxisSummary, Flight, FlightBlock, Scenario, Simulator, Summary, TrueRate};
+use crate::units::{Dimension, Quantity, Unit, shown_unit};
+use crate::view;
 
 /// A sensor stream with truth columns from params.json
 #[derive(Debug, clap::Args)]
@@ -73,42 +72,15 @@ pub struct Args {
 /// Rows handed to the writer at once.
 const BLOCK: usize = 8192;
 
-/// What `simulate --json` prints.
-#[derive(Debug, Serialize, JsonSchema)]
-pub(super) struct Summary {
-    /// "kfdesign-simulation/1".
-    format: &'static str,
-    log: String,
-    quantity: Quantity,
-    sample_rate_hz: f64,
-    samples: u64,
-    duration_s: f64,
-    seed: u64,
-    run: u64,
-    unit: String,
-    axes: Vec<AxisSummary>,
-}
-
-#[derive(Debug, Serialize, JsonSchema)]
-struct AxisSummary {
-    /// Name of the column.
-    name: String,
-    /// Constant bias with the turn-on draw, in `unit`.
-    bias: f64,
-    /// Of the measured column, in `unit`.
-    mean: f64,
-    std_dev: f64,
-    /// Samples at the limit.
-    saturated: u64,
-}
-
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let motion = args.true_rate.strip_prefix("file:").map(Path::new);
     let inputs: Vec<&Path> = std::iter::once(args.params.as_path()).chain(motion).collect();
     files::check(&[("-o", &Some(args.output.clone()), Kind::Table)], &inputs)?;
     let params = checked::params(&args.params)?;
     let scenario = scenario(args, &params)?;
-    say_all(&notes_of_rate(&params, &params.axes.iter().collect::<Vec<_>>(), scenario.rate_hz));
+    let all: Vec<&AxisParams> = params.axes.iter().collect();
+    let notes = view::notes_of_rate(&params, &all, scenario.rate_hz);
+    notes.iter().for_each(|note| say(&format!("note: {note}")));
     let unit = match &args.unit {
         None => display_unit(&params)?,
         Some(text) => {
@@ -158,47 +130,24 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
             saturated: *saturated,
         })
         .collect();
-    report(
-        args,
-        &Summary {
-            format: "kfdesign-simulation/1",
-            log: args.output.display().to_string(),
-            quantity: params.quantity,
-            sample_rate_hz: scenario.rate_hz,
-            samples: scenario.samples,
-            duration_s: scenario.samples as f64 / scenario.rate_hz,
-            seed: scenario.seed,
-            run: scenario.run,
-            unit: shape.unit.text().into(),
-            axes,
-        },
-    )?;
-    Ok(Status::Done)
-}
-
-fn report(args: &Args, summary: &Summary) -> anyhow::Result<()> {
+    let summary = Summary {
+        format: "kfdesign-simulation/1",
+        log: args.output.display().to_string(),
+        quantity: params.quantity,
+        sample_rate_hz: scenario.rate_hz,
+        samples: scenario.samples,
+        duration_s: scenario.samples as f64 / scenario.rate_hz,
+        seed: scenario.seed,
+        run: scenario.run,
+        unit: shape.unit.text().into(),
+        axes,
+    };
     if args.json {
-        return print_json(summary);
+        print_json(&summary)?;
+    } else {
+        print_report(&view::simulate::simulate(&summary));
     }
-    let unit = &summary.unit;
-    let header =
-        ["axis", &format!("bias ({unit})"), &format!("mean ({unit})"), &format!("std dev ({unit})"), "saturated"];
-    let rows: Vec<Vec<String>> = summary
-        .axes
-        .iter()
-        .map(|a| vec![a.name.clone(), digits(a.bias), digits(a.mean), digits(a.std_dev), a.saturated.to_string()])
-        .collect();
-    let sentence = format!(
-        "{}: {} samples at {} Hz ({} s), seed {}, run {}.\n",
-        summary.log,
-        summary.samples,
-        summary.sample_rate_hz,
-        digits(summary.duration_s),
-        summary.seed,
-        summary.run
-    );
-    print_text(&format!("{}{sentence}", table(&header, &rows)));
-    Ok(())
+    Ok(Status::Done)
 }
 
 fn count_saturated(block: &AxisBlock, scenario: &Scenario) -> u64 {

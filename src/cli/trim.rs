@@ -7,15 +7,13 @@ use anyhow::{Context, anyhow, bail};
 use super::Status;
 use super::files::{self, Kind};
 use super::flags::with_unit;
-use super::output::{digits, print_json, print_text, table};
+use super::output::{print_json, print_report};
 use crate::aircraft::airframe::Airplane;
 use crate::aircraft::airframe::trim::{Sideways, TrimRequest, Turn};
-use crate::aircraft::control::document::{CriterionDocument, LinearDocument, Linearized, ModeDocument};
+use crate::aircraft::control::document::Linearized;
 use crate::aircraft::flight::FlightDocument;
-use crate::export::atomic;
 use crate::units::Dimension;
-
-mod page;
+use crate::view;
 
 /// Steady flight, the linear model about it, its modes, handling-quality levels and controllability
 ///
@@ -71,18 +69,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let trim = airplane.trim(&request).with_context(|| shown.to_string())?;
     let linearized = Linearized::new(&airplane, trim).with_context(|| shown.to_string())?;
     let document = linearized.document(&airplane, &request, args.froude)?;
-    if let Some(path) = &args.output {
-        let mut text = serde_json::to_string_pretty(&document)?;
-        text.push('\n');
-        atomic::write(path, text.as_bytes())?;
-    }
-    if let Some(path) = &args.report {
-        atomic::write(path, page::page(&linearized, &document).to_html()?.as_bytes())?;
-    }
+    files::write_json(args.output.as_deref(), &document)?;
+    let report = view::trim::trim(&linearized, &document);
+    files::write_page(args.report.as_deref(), &report)?;
     if args.json {
         print_json(&document)?;
     } else {
-        print_text(&text(&document));
+        print_report(&report);
     }
     Ok(Status::Done)
 }
@@ -128,107 +121,4 @@ fn request(args: &Args, documented: Option<TrimRequest>) -> anyhow::Result<TrimR
             .or(documented.map(|d| d.sideways))
             .unwrap_or_default(),
     })
-}
-
-/// 1, 2, 3, "beyond 3" or "-".
-fn level(level: Option<u8>) -> String {
-    match level {
-        Some(4) => "beyond 3".into(),
-        Some(level) => level.to_string(),
-        None => "-".into(),
-    }
-}
-
-fn mode_row(mode: &ModeDocument) -> Vec<String> {
-    let [re, im] = mode.eigenvalue;
-    let value = if im == 0.0 { format!("{re:.4}") } else { format!("{re:.4} ± {im:.4}i") };
-    let (half, double) = (mode.time_to_half, mode.time_to_double);
-    let time = half.map(|t| format!("half {}", digits(t))).or(double.map(|t| format!("double {}", digits(t))));
-    vec![
-        mode.name.replace('_', " "),
-        value,
-        digits(mode.frequency),
-        format!("{:.3}", mode.damping),
-        time.unwrap_or_else(|| "-".into()),
-    ]
-}
-
-const MODE_HEADER: [&str; 5] = ["mode", "eigenvalue (1/s)", "frequency (rad/s)", "damping", "time (s)"];
-
-/// One row per criterion, its levels in categories A, B and C.
-fn criterion_rows(document: &LinearDocument) -> Vec<Vec<String>> {
-    let mut names: Vec<&str> = Vec::new();
-    for criterion in &document.criteria {
-        if !names.contains(&criterion.name) {
-            names.push(criterion.name);
-        }
-    }
-    let row = |name: &&str| {
-        let all: Vec<&CriterionDocument> = document.criteria.iter().filter(|c| c.name == *name).collect();
-        let value = |of: fn(&CriterionDocument) -> Option<f64>| {
-            let mut values: Vec<String> = all.iter().filter_map(|c| of(c)).map(digits).collect();
-            values.dedup();
-            if values.is_empty() { "-".into() } else { values.join(", ") }
-        };
-        let levels =
-            |of: fn(&CriterionDocument) -> Option<u8>| all.iter().map(|c| level(of(c))).collect::<Vec<_>>().join(" ");
-        let unit = all.first().map_or("", |c| if c.unit == "1" { "" } else { c.unit });
-        let named =
-            if unit.is_empty() { name.replace('_', " ") } else { format!("{} ({unit})", name.replace('_', " ")) };
-        let mut row = vec![named, value(|c| c.value), levels(|c| c.level)];
-        if document.froude_scale.is_some() {
-            row.extend([value(|c| c.scaled_value), levels(|c| c.scaled_level)]);
-        }
-        row
-    };
-    names.iter().map(row).collect()
-}
-
-fn criterion_header(document: &LinearDocument) -> Vec<String> {
-    let mut header = vec!["criterion".to_string(), "as flown".into(), "level A B C".into()];
-    if let Some(scale) = document.froude_scale {
-        header.extend([format!("scaled by {}", digits(scale)), "level A B C".into()]);
-    }
-    header
-}
-
-fn text(document: &LinearDocument) -> String {
-    let t = &document.trim;
-    let deg = |x: f64| format!("{:.3}", x.to_degrees());
-    let mut out = format!(
-        "{} at {} m/s, {} m{}{}: alpha {} deg, bank {} deg, pitch {} deg\n",
-        document.airplane,
-        digits(t.airspeed),
-        digits(t.altitude),
-        if t.climb == 0.0 { String::new() } else { format!(", climb {} deg", digits(t.climb.to_degrees())) },
-        if t.turn_rate == 0.0 {
-            String::new()
-        } else {
-            format!(", turning {} deg/s", digits(t.turn_rate.to_degrees()))
-        },
-        deg(t.alpha),
-        deg(t.phi),
-        deg(t.theta),
-    );
-    let throttle = t.throttle.map_or(String::new(), |x| format!("throttle {x:.4}, "));
-    let motor = if t.current == 0.0 { String::new() } else { format!(", current {} A", digits(t.current)) };
-    out += &format!(
-        "elevator {} deg, aileron {} deg, rudder {} deg, {throttle}thrust {} N{motor}; residual {:.0e}\n",
-        deg(t.elevator),
-        deg(t.aileron),
-        deg(t.rudder),
-        digits(t.thrust),
-        t.residual
-    );
-    for warning in &document.warnings {
-        out += &format!("warning: {warning}\n");
-    }
-    let rows: Vec<Vec<String>> = document.modes.iter().filter(|m| m.model != "full").map(mode_row).collect();
-    out += &format!("\n{}", table(&MODE_HEADER, &rows));
-    let cap = document.cap.map_or(String::new(), |cap| format!(", CAP {} 1/(g s^2)", digits(cap)));
-    out += &format!("n/alpha {} 1/rad{cap}\n", digits(document.load_per_angle));
-    let header = criterion_header(document);
-    let header: Vec<&str> = header.iter().map(String::as_str).collect();
-    out += &format!("\n{}Caution: {}.\n", table(&header, &criterion_rows(document)), document.caution);
-    out
 }

@@ -2,14 +2,9 @@
 
 pub(super) mod attitude;
 mod compare;
-mod insight;
 mod logs;
 mod objective;
 pub(super) mod plant_flags;
-mod sight;
-mod text;
-mod truth;
-mod view;
 
 use std::path::{Path, PathBuf};
 
@@ -21,11 +16,10 @@ use serde_json::json;
 use self::logs::Reading;
 use self::objective::{ObjectiveArg, ObjectiveFlags};
 use self::plant_flags::PlantFlags;
-use self::view::View;
 use super::files::{self, Kind};
 use super::flags::whole;
 use super::log_flags::LogFlags;
-use super::output::{print_json, print_text, progress, say, with_bar};
+use super::output::{print_json, print_report, progress, say, with_bar};
 use super::{Status, VerdictFlags};
 use crate::cli::checked;
 use crate::consistency::Verdict;
@@ -36,6 +30,7 @@ use crate::params::{Params, PlantEntry};
 use crate::replay::ReplayResult;
 use crate::tune::objective::{Objective, Record, Request, tune_by};
 use crate::tune::{AxisReport, Insight, TuneOptions, Tuned, UnderTruth, insight, tune, under_truth};
+use crate::view;
 
 /// The augmented Kalman filter from params.json
 ///
@@ -147,22 +142,18 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if let (Some(output), true) = (&args.output, verified) {
         atomic::write(output, tuned.design.to_json().as_bytes())?;
     }
-    let view = View {
+    let mut report = view::tune::tune(&view::tune::Design {
         name: &name,
         params: &params,
         tuned: &tuned,
         verification: &verification,
-        truth: truth.as_ref(),
+        truth: truth.as_ref().map(|truth| (truth.name.as_str(), truth.axes.as_slice())),
         insights: &insights,
-    };
-    if let Some(path) = &args.plot {
-        atomic::write(path, sight::sheet(&view).as_bytes())?;
-    }
-    if let Some(path) = &args.report {
-        let mut page = sight::page(&view, &replays);
-        page.sections.splice(0..0, record.iter().map(|record| objective::section(record, &params)));
-        atomic::write(path, page.to_html()?.as_bytes())?;
-    }
+        record: record.as_ref(),
+        replays: &replays,
+    });
+    files::write_plot(args.plot.as_deref(), "Tuned filter", &report)?;
+    files::write_page(args.report.as_deref(), &report)?;
     if args.json {
         let filter = serde_json::from_str(&tuned.design.to_json())?;
         print_json(&Printed {
@@ -175,13 +166,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
             replay: &replays,
         })?;
     } else {
-        let mut printed = record.as_ref().map_or_else(String::new, |record| objective::text(record, &params));
-        printed.push_str(&text::design(&view));
-        replays.iter().for_each(|result| printed.push_str(&text::replay(result)));
-        if let Some(output) = &args.output {
-            printed.push_str(&written(output, verified));
-        }
-        print_text(&printed);
+        report.written.extend(args.output.as_deref().map(|output| written(output, verified)));
+        print_report(&report);
     }
     Ok(if verified { args.judging.status(replays.iter().map(|r| r.verdict)) } else { Status::CheckFailed })
 }
@@ -201,11 +187,8 @@ impl Truth {
 }
 
 fn written(output: &Path, verified: bool) -> String {
-    if verified {
-        format!("\n{} written\n", output.display())
-    } else {
-        format!("\n{} not written: the verification failed\n", output.display())
-    }
+    let what = if verified { "written" } else { "not written: the verification failed" };
+    format!("{} {what}", output.display())
 }
 
 /// The design with its parameters chosen as asked, and how they were.

@@ -6,10 +6,9 @@ use anyhow::bail;
 
 use super::flags::with_unit;
 use super::log_flags::print_check;
-use super::output::digits;
 use crate::input::{Block, InputKind, LogOptions, LogReader};
 use crate::signal::LogCheck;
-use crate::units::{Dimension, Quantity, Unit};
+use crate::units::{Dimension, Quantity, Unit, digits};
 
 /// Files above this many bytes (as stored) are read in windows …
 const LARGE_FILE: u64 = 4 << 30;

@@ -5,6 +5,8 @@
 pub mod allan_fit;
 pub mod graphical;
 mod likelihood;
+pub mod log_plan;
+mod on_temperature;
 mod points;
 mod selection;
 mod shape;
@@ -17,10 +19,11 @@ pub use likelihood::hold::{Held, Hold, HoldCost};
 pub use likelihood::maximum::maximum;
 pub use likelihood::recent::{Recent, recent};
 pub use likelihood::{Fitted, plan, temperature, windows};
+pub use on_temperature::{OnTemperature, TemperatureDocument};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::allan::{AllanCurve, AllanPoint};
+use crate::allan::{AllanCurve, AllanPoint, AxisCurve};
 use crate::consistency::effect::{PERIODOGRAM_TOLERANCE, VARIANCE_RATIO_TOLERANCE};
 use crate::filter::likelihood::Stretch;
 use crate::noise::{Kind, NoiseModel, Term};
@@ -155,6 +158,18 @@ pub struct Identified {
     pub first_tau_s: Option<f64>,
     /// From which the parameters are.
     pub samples: usize,
+}
+
+/// One axis as read and as identified.
+#[derive(Clone, Debug)]
+pub struct IdentifiedAxis {
+    pub measured: AxisCurve,
+    /// Samples of the log that are not among those on which the terms were chosen.
+    pub left_out: usize,
+    /// Of those, the ones that were filled in.
+    pub filled: usize,
+    pub found: Identified,
+    pub temperature: Option<OnTemperature>,
 }
 
 /// A fit that one true model in a million has.

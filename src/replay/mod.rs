@@ -298,12 +298,12 @@ pub struct AxisResult {
     pub follow: Option<FollowResult>,
     /// For figures; not part of the document.
     #[serde(skip)]
-    pub sight: Sight,
+    pub curves: Curves,
 }
 
 /// What figures of one axis show.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Sight {
+pub struct Curves {
     pub trace: Vec<Point>,
     pub samples_per_point: u64,
     /// Lags 1, 2, …

@@ -9,7 +9,7 @@
 use super::axis::{AxisReplay, Channel};
 use super::follow::Following;
 use super::{
-    AxisResult, FinalState, LowFrequencySummary, Nis, Options, ReplayResult, Replayer, Sight, Start, WhitenessSummary,
+    AxisResult, Curves, FinalState, LowFrequencySummary, Nis, Options, ReplayResult, Replayer, Start, WhitenessSummary,
 };
 use crate::consistency::effect::{self, Effect};
 use crate::consistency::normalized::{gated_moments, moment_matched};
@@ -140,11 +140,11 @@ fn axis_result(view: &View<'_>, log_axis: String, options: &Options) -> (AxisRes
         low_frequency: Vec::new(),
         start: None,
         follow: axis.following.as_ref().map(Following::result),
-        sight: Sight {
+        curves: Curves {
             trace: channel.trace.points().to_vec(),
             samples_per_point: channel.trace.samples_per_point(),
             nis_histogram: channel.nis_histogram.to_vec(),
-            ..Sight::default()
+            ..Curves::default()
         },
     };
     let mut tests = Vec::new();
@@ -187,8 +187,8 @@ fn axis_result(view: &View<'_>, log_axis: String, options: &Options) -> (AxisRes
         let interval_s = length as f64 * dt;
         tests.push(periodogram.test(name, interval_s));
         let blocks = 2 * periodogram.ordinates + 1;
-        result.sight.periodogram_bound = periodogram.bound;
-        result.sight.cumulative_periodogram = thinned(&periodogram.share)
+        result.curves.periodogram_bound = periodogram.bound;
+        result.curves.cumulative_periodogram = thinned(&periodogram.share)
             .map(|(i, share)| ((i + 1) as f64 / (blocks as f64 * interval_s), share))
             .collect();
     }
@@ -200,8 +200,8 @@ fn axis_result(view: &View<'_>, log_axis: String, options: &Options) -> (AxisRes
         ljung_box_p_value: whiteness.ljung_box_upper_p_value,
         lags: whiteness.lags,
     });
-    result.sight.autocorrelation_bound = normal_quantile(1.0 - alpha / 2.0) / (accepted as f64).sqrt();
-    result.sight.autocorrelation = whiteness.autocorrelation;
+    result.curves.autocorrelation_bound = normal_quantile(1.0 - alpha / 2.0) / (accepted as f64).sqrt();
+    result.curves.autocorrelation = whiteness.autocorrelation;
     (result, tests)
 }
 

@@ -24,10 +24,14 @@
 
 mod flight;
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use crate::noise::{Kind, SamplePath};
 use crate::numerics::progress::checkpoint;
 use crate::numerics::random::{StreamId, normal, stream};
 use crate::params::{AxisParams, Params};
+use crate::units::Quantity;
 
 pub use flight::{Flight, FlightBlock};
 
@@ -273,4 +277,33 @@ fn sense(scenario: &Scenario, measured: &mut [f64]) {
             *x = x.clamp(-limit, limit);
         }
     }
+}
+
+/// What `simulate --json` prints.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Summary {
+    /// "kfdesign-simulation/1".
+    pub format: &'static str,
+    pub log: String,
+    pub quantity: Quantity,
+    pub sample_rate_hz: f64,
+    pub samples: u64,
+    pub duration_s: f64,
+    pub seed: u64,
+    pub run: u64,
+    pub unit: String,
+    pub axes: Vec<AxisSummary>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct AxisSummary {
+    /// Name of the column.
+    pub name: String,
+    /// Constant bias with the turn-on draw, in `unit`.
+    pub bias: f64,
+    /// Of the measured column, in `unit`.
+    pub mean: f64,
+    pub std_dev: f64,
+    /// Samples at the limit.
+    pub saturated: u64,
 }

@@ -254,3 +254,27 @@ pub fn digits(x: f64) -> String {
         format!("{x:.3e}")
     }
 }
+
+/// Seconds below two minutes, minutes below two hours, hours below a thousand of them, else days.
+pub fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 120.0 => format!("{} s", digits(s)),
+        s if s < 7200.0 => format!("{} min", digits(s / 60.0)),
+        s if s < 3.6e6 => format!("{} h", digits(s / 3600.0)),
+        s => format!("{} days", digits(s / 86_400.0)),
+    }
+}
+
+/// The quantity itself is shown in the unit of the axis, its integral and its derivative (an angle, an acceleration)
+/// in the unit that goes with it, all else in SI: scale and text.
+pub fn shown_unit(si: &str, quantity: Quantity, unit: &Unit) -> (f64, String) {
+    if si == quantity.si_unit() {
+        return (unit.scale(), unit.to_string());
+    }
+    let dimension = Unit::parse(si).map(|si| si.dimension());
+    let family = [2, -2].map(|half_powers| unit.times_time(half_powers));
+    match family.into_iter().find(|unit| dimension == Ok(unit.dimension())) {
+        Some(unit) => (unit.scale(), unit.to_string()),
+        None => (1.0, si.to_owned()),
+    }
+}

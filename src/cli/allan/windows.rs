@@ -2,8 +2,8 @@
 
 use anyhow::Context;
 
-use super::{Args, AxisCurve, Header};
-use crate::allan::{Deviation, Pooled, TauGrid, deviation};
+use super::{Args, Header};
+use crate::allan::{AxisCurve, Deviation, Pooled, TauGrid, deviation};
 use crate::cli::windows::{Windows, note};
 use crate::identify::allan_fit;
 use crate::input::{InputKind, LogOptions};

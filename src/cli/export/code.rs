@@ -7,12 +7,13 @@ use anyhow::{Context, anyhow, bail};
 
 use super::super::Status;
 use super::super::files;
-use super::super::output::print_text;
+use super::super::output::{print_report, print_text};
 use super::{Args, TargetFlag};
 use crate::cli::checked;
 use crate::export::atomic::{self, AtomicFile};
 use crate::export::code::{self, Code, Gain, Precision, Source};
 use crate::input::sha256;
+use crate::view;
 
 /// Of the code.
 #[derive(Debug, clap::Args)]
@@ -93,10 +94,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     };
     match folder {
         Some(folder) => {
-            write(&folder, &name, &sources, path)?;
-            if args.to == TargetFlag::C {
-                print_text(&format!("self-test, in that folder: {}\n", code::self_test_command(&name)));
-            }
+            let files = write(&folder, &name, &sources, path)?;
+            let test = (args.to == TargetFlag::C).then(|| code::self_test_command(&name));
+            print_report(&view::export::export(&files, test));
         }
         None => print_text(&sources.iter().map(|source| source.text.as_str()).collect::<String>()),
     }
@@ -120,8 +120,8 @@ fn place(args: &Args) -> anyhow::Result<(Option<PathBuf>, String)> {
     Ok((Some(output.parent().unwrap_or(Path::new("")).to_path_buf()), name))
 }
 
-/// All files or, when one cannot be made, none.
-fn write(folder: &Path, name: &str, sources: &[Source], input: &Path) -> anyhow::Result<()> {
+/// All files or, when one cannot be made, none; their names.
+fn write(folder: &Path, name: &str, sources: &[Source], input: &Path) -> anyhow::Result<Vec<String>> {
     let mut files = Vec::new();
     for source in sources {
         let path = folder.join(format!("{name}{}", source.suffix));
@@ -130,11 +130,10 @@ fn write(folder: &Path, name: &str, sources: &[Source], input: &Path) -> anyhow:
         file.write_all(source.text.as_bytes()).with_context(|| path.display().to_string())?;
         files.push(file);
     }
-    let mut text = String::new();
+    let mut names = Vec::new();
     for file in files {
-        text.push_str(&format!("{} written\n", file.path().display()));
+        names.push(file.path().display().to_string());
         file.commit()?;
     }
-    print_text(&text);
-    Ok(())
+    Ok(names)
 }

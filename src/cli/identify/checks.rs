@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use super::Axis;
 use crate::cli::Status;
 use crate::cli::output::say;
+use crate::identify::IdentifiedAxis;
 use crate::params::{Check, CheckKind, Params};
 use crate::signal::LogCheck;
 use crate::signal::check::FindingKind;
 
 /// What was found wrong with the logs and the fits. Without motion no part is named.
-pub(super) fn checks(logs: &[LogCheck], axes: &[Axis]) -> Vec<Check> {
+pub(super) fn checks(logs: &[LogCheck], axes: &[IdentifiedAxis]) -> Vec<Check> {
     let several = logs.len() > 1;
     let named = |wanted: FindingKind, kind: CheckKind| {
         logs.iter().enumerate().flat_map(move |(i, check)| {

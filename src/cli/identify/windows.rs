@@ -2,12 +2,12 @@
 
 use anyhow::bail;
 
-use super::{Args, Axis, Log, MethodArg, holds_of};
-use crate::cli::allan::AxisCurve;
+use super::{Args, Log, MethodArg, holds_of};
+use crate::allan::AxisCurve;
 use crate::cli::stretch;
 use crate::cli::windows::{Windows, note};
 use crate::identify::windows::Windows as Likelihoods;
-use crate::identify::{Hold, ModelChoice};
+use crate::identify::{Hold, IdentifiedAxis, ModelChoice};
 use crate::input::{LogOptions, TemperatureColumn};
 
 /// The axes in windows, if `--window` or the size of the file asks for it.
@@ -16,7 +16,7 @@ pub(super) fn axes(
     choice: &ModelChoice,
     holds: &[Hold],
     options: &LogOptions,
-) -> anyhow::Result<Option<(Log, Vec<Axis>)>> {
+) -> anyhow::Result<Option<(Log, Vec<IdentifiedAxis>)>> {
     let other = match () {
         () if args.method != MethodArg::Likelihood => Some("--method likelihood"),
         () if args.logs.len() > 1 => Some("one log"),
@@ -55,12 +55,12 @@ pub(super) fn axes(
         identified.warnings.push(format!("{said}; outliers, steps and a temperature were not looked for"));
         log.warn_of_motion(&name, &mut identified);
         let (curve, fit) = (identified.curve.clone(), Ok(identified.model.clone()));
-        found.push(Axis {
+        found.push(IdentifiedAxis {
             measured: AxisCurve { name, unit, note: None, curve, fit },
             left_out: left_out as usize,
             filled: 0,
             found: identified,
-            warmth: None,
+            temperature: None,
         });
     }
     Ok(Some((log, found)))

@@ -1,10 +1,10 @@
 //! What `identify` says of a log beside the parameters.
 
-use crate::cli::output::digits;
 use crate::cli::stretch::Stretch;
 use crate::identify::{Identified, Recent};
 use crate::params::BetweenLogs;
 use crate::signal::upsets;
+use crate::units::digits;
 
 /// Steps of the level that are listed.
 const MOST_STEPS: usize = 5;

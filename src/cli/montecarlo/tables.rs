@@ -7,9 +7,10 @@ use anyhow::bail;
 
 use super::Args;
 use crate::cli::Status;
-use crate::cli::output::{digits, print_text};
+use crate::cli::output::print_text;
 use crate::export::table::TableWriter;
 use crate::montecarlo::{Course, Experiment};
+use crate::units::digits;
 
 /// One run alone, as a table.
 pub(super) fn one_run(args: &Args, experiment: &Experiment, course: &Course, number: u64) -> anyhow::Result<Status> {

@@ -7,16 +7,17 @@ use super::{Args, FormFlag, Status};
 use crate::cli::aid_columns::column_and_unit;
 use crate::cli::checked;
 use crate::cli::log_flags::print_check;
-use crate::cli::output::{digits, print_json, print_text, progress, table};
+use crate::cli::output::{print_json, print_report, progress};
 use crate::export::table::TableWriter;
 use crate::filter::AttitudeDesign;
 use crate::filter::attitude::{Heading, Row};
 use crate::input::{Block, ExtraColumn, LogOptions, LogReader};
 use crate::params::Measured;
 use crate::replay::LogShape;
-use crate::replay::attitude::{AttitudeEstimate, AttitudeReplay, AttitudeReplayer, LogRow, Reference};
+use crate::replay::attitude::{AttitudeEstimate, AttitudeReplayer, LogRow, Reference};
 use crate::replay::axes::assign_to;
 use crate::units::{Dimension, Quantity, Unit};
+use crate::view;
 
 /// What only an attitude filter is asked.
 #[derive(Debug, clap::Args)]
@@ -131,7 +132,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if args.json {
         print_json(&result)?;
     } else {
-        print_text(&text(&result, &design));
+        print_report(&view::replay::attitude(&result, &design));
     }
     Ok(args.judging.status([result.verdict]))
 }
@@ -245,65 +246,4 @@ fn write_row(table: &mut [Vec<f64>], estimate: &AttitudeEstimate) {
     let drift = estimate.drift.iter().zip(&estimate.drift_sigma).flat_map(|(value, sigma)| [*value, *sigma]);
     let values = [estimate.time_s].into_iter().chain(attitude).chain(estimate.sigma).chain(drift);
     table.iter_mut().zip(values).for_each(|(column, value)| column.push(value));
-}
-
-fn text(result: &AttitudeReplay, design: &AttitudeDesign) -> String {
-    let degrees = |rad: f64| digits(rad.to_degrees());
-    let mut out = format!(
-        "{} samples, {} gaps ({} missing), {} unusable; gyro taken as its own drift, at rest: {}\n\n",
-        result.samples, result.gaps, result.missing, result.unusable, result.at_rest
-    );
-    let used = [("horizontal specific force", result.specific_force), ("heading", result.heading)];
-    let used = used.iter().filter(|(_, used)| used.samples > 0).map(|(name, used)| {
-        vec![name.to_string(), used.samples.to_string(), used.outliers.to_string(), digits(used.nis)]
-    });
-    out.push_str(&table(&["measurement", "taken", "outliers (weighted down)", "mean NIS"], &used.collect::<Vec<_>>()));
-    if let Some(errors) = &result.errors {
-        out.push_str(&format!("\nErrors against the reference, {} samples (deg)\n", errors.samples));
-        let row = |name: &str, rmse: f64, sigma: Option<f64>| {
-            vec![name.to_string(), digits(rmse), sigma.map_or("-".to_string(), digits)]
-        };
-        let rows = [
-            row("total", errors.total_rmse_deg, None),
-            row("heading", errors.heading_rmse_deg, Some(errors.heading_sigma_deg).filter(|_| errors.degrees == 3)),
-            row("inclination", errors.inclination_rmse_deg, Some(errors.inclination_sigma_deg)),
-        ];
-        out.push_str(&table(&["error", "RMSE", "mean claimed sigma"], &rows));
-        if let Some(offset) = errors.heading_offset_deg {
-            out.push_str(&format!("a constant heading of {} deg was taken off: nothing measures it\n", digits(offset)));
-        }
-        let up = errors
-            .covered_up
-            .map_or(String::new(), |share| format!(", about the vertical {} %", digits(100.0 * share)));
-        out.push_str(&format!(
-            "mean NEES {} of {} with {} deg and {} ms of the reference allowed for, {} without\n\
-             in the claimed 3 sigma: {} % of the samples; about east {} %, about north {} %{up}\n",
-            digits(errors.nees),
-            errors.degrees,
-            digits(errors.reference_std_dev_deg),
-            digits(1e3 * errors.reference_timing_s),
-            digits(errors.nees_of_claim),
-            digits(100.0 * errors.covered),
-            digits(100.0 * errors.covered_east),
-            digits(100.0 * errors.covered_north)
-        ));
-    }
-    if !result.rests.is_empty() {
-        out.push_str("\nGyro drift at the end of each rest, with sigma, and the mean rate of the rest (deg/s)\n");
-        let mut header = vec!["rest (s)".to_string()];
-        for axis in &design.axes {
-            header.extend([axis.clone(), "sigma".to_string(), "mean rate".to_string()]);
-        }
-        let rows = result.rests.iter().map(|rest| {
-            let mut row = vec![format!("{} to {}", digits(rest.start_s), digits(rest.end_s))];
-            for i in 0..3 {
-                row.extend([rest.drift[i], rest.sigma[i], rest.mean_rate[i]].map(degrees));
-            }
-            row
-        });
-        let header: Vec<&str> = header.iter().map(String::as_str).collect();
-        out.push_str(&table(&header, &rows.collect::<Vec<_>>()));
-    }
-    out.push_str(&format!("\n{}: {}\n", result.verdict.word(), result.meaning));
-    out
 }

@@ -7,13 +7,13 @@ use anyhow::{Context, bail};
 use super::logs::{Opened, Reading};
 use crate::cli::Status;
 use crate::cli::checked;
-use crate::cli::output::{digits, print_json, print_text, table};
-use crate::compare::designs::{Contest, RankError, Ranking};
+use crate::cli::output::{print_json, print_report};
+use crate::compare::designs::{Contest, RankError};
 use crate::filter::FilterDesign;
 use crate::input::InputError;
 use crate::params::{Params, place};
 use crate::tune::{TuneOptions, tune};
-use crate::units::Unit;
+use crate::view;
 
 pub(super) fn run(
     files: &[PathBuf],
@@ -49,7 +49,7 @@ pub(super) fn run(
     if json {
         print_json(&ranking)?;
     } else {
-        print_text(&text(&ranking, &first));
+        print_report(&view::tune::ranking(&ranking, &first));
     }
     Ok(Status::Done)
 }
@@ -76,30 +76,4 @@ fn design(path: &Path, options: &TuneOptions) -> anyhow::Result<(String, FilterD
     let design = FilterDesign::from_json(&text, &name)?;
     checked::say(path, checked::recorded(&design.tuning));
     Ok((name, design))
-}
-
-fn text(ranking: &Ranking, design: &FilterDesign) -> String {
-    let unit = design.axes.first().map(|axis| axis.noise.display_unit(design.quantity)).unwrap_or_else(Unit::one);
-    let rows = ranking.designs.iter().enumerate().map(|(i, d)| {
-        let verdicts: Vec<&str> = d.verdicts.iter().map(|verdict| verdict.word()).collect();
-        let sigmas: Vec<String> = d.steady.iter().map(|axis| digits(unit.from_si(axis.sigma))).collect();
-        let behind = if i == 0 { "-".into() } else { format!("{:.2} ± {:.2}", d.behind, d.behind_std_dev) };
-        vec![
-            d.design.clone(),
-            d.objective.clone().unwrap_or_else(|| "-".into()),
-            format!("{:.2}", d.held_out_log_likelihood),
-            behind,
-            verdicts.join(", "),
-            sigmas.join(", "),
-        ]
-    });
-    let sigma = format!("steady sigma ({unit})");
-    let header = ["design", "objective", "held-out ln L", "behind", "verdict", &sigma];
-    format!(
-        "Designs by the likelihood of the last {:.1} % of {}\n{}\n{}\n",
-        100.0 * ranking.held_out,
-        ranking.logs.join(", "),
-        table(&header, &rows.collect::<Vec<_>>()),
-        ranking.meaning
-    )
 }

@@ -1,9 +1,57 @@
-//! The figures of a flight.
+//! A flight.
 
+use crate::aircraft::flight::{ColumnReport, FlightReport};
 use crate::report::figure::{self, Curve, Envelope, TimeLines, Track};
+use crate::report::{Level, Report, Section};
+use crate::units::digits;
 
-/// All of them, one above the other. `stops` in rad.
-pub(super) fn sheet(airplane: &str, header: &[String], lines: &Envelope, stops: &[f64]) -> String {
+/// Columns of angles and rates, and the unit in which they are shown.
+const ANGLES: [(&str, &str); 8] = [
+    ("phi (rad)", "deg"),
+    ("theta (rad)", "deg"),
+    ("p (rad/s)", "deg/s"),
+    ("q (rad/s)", "deg/s"),
+    ("r (rad/s)", "deg/s"),
+    ("elevator (rad)", "deg"),
+    ("aileron (rad)", "deg"),
+    ("rudder (rad)", "deg"),
+];
+
+/// `header` and `lines`: columns of the log and their course, empty where no figure is wanted; `stops` in rad.
+pub fn fly<'a>(flown: &FlightReport, header: &'a [String], lines: &'a Envelope, stops: &[f64]) -> Report<'a> {
+    let mut section = Section::new("");
+    if let Some(first) = flown.runs.first() {
+        let rows = ANGLES.iter().filter_map(|(name, unit)| {
+            let at = first.columns.iter().position(|column| column.name == *name)?;
+            let of_runs = || flown.runs.iter().map(move |run| &run.columns[at]);
+            let mean = |of: fn(&ColumnReport) -> f64| of_runs().map(of).sum::<f64>() / flown.runs.len() as f64;
+            let least = of_runs().map(|c| c.least).fold(f64::INFINITY, f64::min);
+            let greatest = of_runs().map(|c| c.greatest).fold(f64::NEG_INFINITY, f64::max);
+            let rms = mean(|c| c.std_dev * c.std_dev).sqrt();
+            let cells = [mean(|c| c.mean), rms, least, greatest].map(|x| digits(x.to_degrees()));
+            let name = name.split(' ').next().unwrap_or(name);
+            Some([format!("{name} ({unit})")].into_iter().chain(cells))
+        });
+        let logs: Vec<&str> = flown.runs.iter().filter_map(|run| run.log.as_deref()).collect();
+        let files = match logs.as_slice() {
+            [] => String::new(),
+            [one] => format!("{one}: "),
+            [one, .., last] => format!("{one} … {last}: "),
+        };
+        let runs = if flown.runs.len() == 1 { String::new() } else { format!("{} runs of ", flown.runs.len()) };
+        section =
+            section.table("", &["", "mean", "std dev", "least", "greatest"], rows).at(Level::Brief).paragraph(format!(
+                "{files}{runs}{} s of {}, {} rows every {} s, steps of {} s, seed {}.",
+                flown.duration_s, flown.airplane, first.rows, flown.every_s, flown.step_s, flown.seed
+            ));
+    }
+    section =
+        figures(header, lines, stops).into_iter().fold(section, |section, svg| section.figure("", move || svg.clone()));
+    Report { title: format!("Flight of {}", flown.airplane), sections: vec![section], ..Report::default() }
+}
+
+/// Nothing without lines.
+fn figures(header: &[String], lines: &Envelope, stops: &[f64]) -> Vec<String> {
     let line = |name: &str| -> Option<Vec<(f64, f64)>> {
         let number = header.iter().position(|column| column.split(' ').next() == Some(name))?;
         Some(lines.line(number))
@@ -44,8 +92,7 @@ pub(super) fn sheet(airplane: &str, header: &[String], lines: &Envelope, stops: 
         way(&line),
         height(),
     ];
-    let figures: Vec<String> = figures.into_iter().flatten().collect();
-    figure::sheet(&format!("Flight of {airplane}"), &figures)
+    figures.into_iter().flatten().collect()
 }
 
 /// Time and value.

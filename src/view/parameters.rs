@@ -1,51 +1,41 @@
-//! The tables of `identify`, for the terminal and for the page.
+//! Noise parameters, one row each.
 
-use super::Axis;
-use crate::cli::output::digits;
-use crate::identify::{Candidate, Precision};
+use crate::identify::{Identified, Precision};
 use crate::noise::FLICKER_FLOOR;
 use crate::params::{Measured, TermEntry};
-use crate::units::{Quantity, Unit};
+use crate::report::Section;
+use crate::units::{Quantity, Unit, digits};
 
-/// A table as text and as HTML.
-pub(super) struct Shown {
-    pub(super) caption: &'static str,
-    pub(super) header: &'static [&'static str],
-    pub(super) rows: Vec<Vec<String>>,
-}
-
-/// Values with intervals; of the likelihood method with standard deviations beside their bound.
-pub(super) fn parameters(axis: &Axis, quantity: Quantity) -> Shown {
-    let found = &axis.found;
+/// Values with intervals; of the likelihood method with standard deviations and their bound.
+pub(super) fn table<'a>(section: Section<'a>, found: &Identified, quantity: Quantity) -> Section<'a> {
     let turn_on = found.params.turn_on_bias.as_ref();
-    let caption = if turn_on.is_some() { "bias (mean of all starts)" } else { "bias (mean of this log)" };
-    let bias = found.params.bias.iter().map(|bias| row(caption, bias, String::new()));
-    let bias = bias.chain(turn_on.map(|spread| row("turn-on bias sigma", spread, String::new()))).collect();
-    let (bias, mut rows): (Vec<Vec<String>>, _) =
-        (bias, term_rows(&found.params.terms, quantity, 1.0 / found.curve.dt));
+    let name = if turn_on.is_some() { "bias (mean of all starts)" } else { "bias (mean of this log)" };
+    let bias = found.params.bias.iter().map(|bias| row(name, bias, String::new()));
+    let bias = bias.chain(turn_on.map(|spread| row("turn-on bias sigma", spread, String::new())));
+    let terms = term_rows(&found.params.terms, quantity, 1.0 / found.curve.dt);
     if found.precision.is_empty() {
-        let header = &["parameter", "value", "95 % from", "to", "unit", "also"];
-        return Shown { caption: "Parameters with 95 % intervals", header, rows: [bias, rows].concat() };
+        let header = ["parameter", "value", "95 % from", "to", "unit", "also"];
+        return section.table("Parameters with 95 % intervals", &header, bias.chain(terms));
     }
-    let mut precision = found.precision.iter();
-    for row in &mut rows {
-        row.splice(5..5, cells(precision.next()));
-    }
-    let bias = bias.into_iter().map(|mut row| {
-        row.splice(5..5, cells(None));
+    let with_bound = |mut row: Vec<String>, precision: Option<&Precision>| {
+        row.splice(5..5, cells(precision));
         row
-    });
-    Shown {
-        caption: "Parameters with 95 % intervals, and their standard deviation beside the Cramér-Rao bound of a log like this",
-        header: &["parameter", "value", "95 % from", "to", "unit", "sd (%)", "bound (%)", "ratio", "also"],
-        rows: bias.chain(rows).collect(),
-    }
+    };
+    let mut precision = found.precision.iter();
+    let terms = terms.into_iter().map(|row| with_bound(row, precision.next()));
+    section
+        .table(
+            "Parameters with 95 % intervals, and their standard deviation beside the Cramér-Rao bound of a log like this",
+            &["parameter", "value", "95 % from", "to", "unit", "sd (%)", "bound (%)", "ratio", "also"],
+            bias.map(|row| with_bound(row, None)).chain(terms),
+        )
+        .minor(&["sd (%)", "bound (%)", "ratio"])
 }
 
 /// Standard deviation, its bound and their ratio, as far as there are any.
-fn cells(own: Option<&Precision>) -> [String; 3] {
+fn cells(precision: Option<&Precision>) -> [String; 3] {
     let none = || "-".to_string();
-    match own {
+    match precision {
         Some(Precision { std_dev_percent: sd, cramer_rao_percent: bound, .. }) if *sd < 1000.0 => {
             let known = bound.is_finite();
             let [bound, ratio] = [digits(*bound), format!("{:.2}", sd / bound)].map(|cell| known.then_some(cell));
@@ -62,15 +52,15 @@ fn row(name: &str, value: &Measured, also: String) -> Vec<String> {
 }
 
 /// One row for each parameter, in the order of the document.
-pub(in crate::cli) fn term_rows(terms: &[TermEntry], quantity: Quantity, sample_rate_hz: f64) -> Vec<Vec<String>> {
+pub(super) fn term_rows(terms: &[TermEntry], quantity: Quantity, sample_rate_hz: f64) -> Vec<Vec<String>> {
     let mut rows = Vec::new();
     let wideband: Vec<&Measured> = terms.iter().filter_map(TermEntry::wideband_density).collect();
     let total = wideband.iter().map(|density| density.si()).fold(0.0, f64::hypot);
-    // the last of them is told as a random walk: all together
-    let and_all = |density: &Measured, own: Option<String>| {
+    // beside the last of them stands the random walk of all
+    let and_all = |density: &Measured, also: Option<String>| {
         let last = wideband.last().is_some_and(|last| std::ptr::eq(*last, density));
         let all = if last { random_walk_name(total, quantity) } else { None };
-        own.into_iter().chain(all).collect::<Vec<_>>().join("; ")
+        also.into_iter().chain(all).collect::<Vec<_>>().join("; ")
     };
     for term in terms {
         match term {
@@ -145,51 +135,6 @@ fn walk_name(density: &Measured, quantity: Quantity) -> String {
         Quantity::SpecificForce => "mg/sqrt(h)",
     };
     in_unit(density.si(), unit).unwrap_or_default()
-}
-
-/// Candidates shown; all are in the JSON document.
-const SHOWN_CANDIDATES: usize = 6;
-
-/// The models that were compared; none for the graphical recipe.
-pub(super) fn candidates(candidates: &[Candidate]) -> Option<Shown> {
-    let chosen = candidates.iter().find(|c| c.chosen)?;
-    let best = candidates.iter().map(|c| c.score).fold(f64::INFINITY, f64::min);
-    let shown = |(place, c): &(usize, &Candidate)| *place < SHOWN_CANDIDATES || c.chosen;
-    let against = |own: Option<f64>, other: Option<f64>| match (own, other) {
-        (Some(own), Some(other)) => format!("{:+.2}", own - other),
-        _ => "-".into(),
-    };
-    let row = |(_, c): (usize, &Candidate)| {
-        let mark = match (c.chosen, c.identified) {
-            (true, _) => "chosen",
-            (false, false) => "not identified",
-            (false, true) => "",
-        };
-        let figures = match c.chi_square.zip(c.dof) {
-            Some((chi_square, dof)) => [digits(chi_square), dof.to_string(), digits(c.score)],
-            None => [
-                against(c.log_likelihood, chosen.log_likelihood),
-                against(c.held_out, chosen.held_out),
-                format!("{:+.2}", c.score - best),
-            ],
-        };
-        [vec![c.model.clone(), c.parameters.to_string()], figures.to_vec(), vec![mark.to_string()]].concat()
-    };
-    let rows = candidates.iter().enumerate().filter(shown).map(row).collect();
-    Some(if chosen.chi_square.is_some() {
-        Shown {
-            caption: "Candidates (score = chi-square + 4 per parameter + 4 per process; lowest wins)",
-            header: &["model", "parameters", "chi-square", "dof", "score", ""],
-            rows,
-        }
-    } else {
-        Shown {
-            caption: "Candidates (ln L of the log, and of its last third under what the first two thirds give, against the chosen; score: \
-                      -2 ln L plus a cost for every process, lowest wins, unless one within 6 of it foretells that third better by more than 3)",
-            header: &["model", "parameters", "ln L", "held out", "score", ""],
-            rows,
-        }
-    })
 }
 
 #[cfg(test)]

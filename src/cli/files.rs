@@ -107,7 +107,7 @@ pub(super) fn write_plot(path: Option<&Path>, title: &str, report: &Report<'_>) 
 /// The page, where a file for it is named.
 pub(super) fn write_page(path: Option<&Path>, report: &Report<'_>) -> anyhow::Result<()> {
     let Some(path) = path else { return Ok(()) };
-    Ok(atomic::write(path, html::page(report)?.as_bytes())?)
+    Ok(atomic::write(path, with_flags(&html::page(report)?).as_bytes())?)
 }
 
 /// A pipe that has a name of its own; what a shell makes of `<(…)`, and `/dev/stdout`, have none.

@@ -51,6 +51,10 @@ fn of_axis<'a>(axis: &'a IdentifiedAxis, params: &Params) -> Section<'a> {
         .figure("The measured curve with exact 95 % intervals for the model, and the model's terms.", || {
             allan::figure(&axis.measured)
         });
+    let section = match &found.hold {
+        Some(hold) => section.at(Level::Brief).paragraph(hold.sentence()).at(Level::Full),
+        None => section,
+    };
     let mut section = candidates(section, &found.candidates);
     if !found.steps.is_empty() {
         section = section

@@ -1,6 +1,7 @@
 //! States, loop and error budgets of a design in numbers.
 
 use super::Group;
+use crate::noise::Kind;
 use crate::model::{DRIFT, LinearModel};
 use crate::report::Section;
 use crate::tune::Share;
@@ -49,9 +50,6 @@ fn state_rows(group: &Group<'_>) -> Vec<Vec<String>> {
     (0..model.states.len()).map(row).collect()
 }
 
-/// States that are noise of the measurement, not drift.
-const NOISE: [&str; 4] = ["quantization", "moving_average", "band_limit", "oscillation"];
-
 /// Label and value of what is said in one line each.
 fn facts(group: &Group<'_>) -> Vec<(&'static str, String)> {
     let (model, steady, report) = (&group.design.model, &group.design.steady_state, group.report);
@@ -61,8 +59,8 @@ fn facts(group: &Group<'_>) -> Vec<(&'static str, String)> {
         let root_r = model.r[(i, i)].sqrt() / scale;
         let which = if model.measurements.len() > 1 { format!(" of {}", measurement.name) } else { String::new() };
         // R is all of a sample's noise only where none of it has states
-        let is_noise =
-            |s: usize| model.h[(i, s)] != 0.0 && NOISE.iter().any(|kind| model.states[s].name.contains(kind));
+        let noise = |s: usize| Kind::of_state(&model.states[s].name).is_some_and(|kind| !kind.is_drift());
+        let is_noise = |s: usize| model.h[(i, s)] != 0.0 && noise(s);
         let white = if (0..model.states.len()).any(is_noise) { "white noise of " } else { "" };
         let [r, sigma] = [root_r * root_r, root_r].map(digits);
         facts.push(("R", format!("{r} ({unit})^2: {white}one sample{which} has sigma {sigma} {unit}")));
@@ -144,8 +142,8 @@ fn budget_table<'a>(section: Section<'a>, caption: String, budget: &[Share], sca
 
 /// States with a column of their own: not those that only together stand for flicker or an average.
 pub(super) fn single(model: &LinearModel) -> impl Iterator<Item = usize> + '_ {
-    let together = ["bias_instability", "moving_average", "band_limit"];
-    (0..model.states.len()).filter(move |&i| !together.iter().any(|kind| model.states[i].name.starts_with(kind)))
+    let joint = |i: usize| Kind::of_state(&model.states[i].name).is_some_and(Kind::has_joint_states);
+    (0..model.states.len()).filter(move |&i| !joint(i))
 }
 
 /// Sigma over time, about one row per decade.

@@ -58,6 +58,7 @@ pub mod model;
 pub mod montecarlo;
 pub mod noise;
 pub mod numerics;
+pub mod ops;
 pub mod params;
 pub mod replay;
 pub mod report;

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use super::Status;
 use super::files::{self, Kind};
-use super::flags::with_unit;
 use super::output::{print_json, print_report};
 use crate::aircraft::airframe::Airplane;
+use crate::ops::amounts::with_unit;
 use crate::units::Dimension;
 use crate::view;
 

@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow, bail};
 
 use super::files::{self, Kind, Output};
-use super::log_flags::{LogFlags, print_check};
 use super::output::{print_json, print_report, say};
-use super::stretch::stretches;
 use super::{Status, VerdictFlags};
-use crate::cli::checked;
 use crate::compare::parameters::parameters;
 use crate::compare::{self, Log, LogAxis};
 use crate::import::{self, ImportError};
+use crate::ops::checked;
+use crate::ops::reading::{Reading, note_check};
+use crate::ops::stretch::stretches;
 use crate::params::{AxisParams, Params};
 use crate::replay::axes::partners;
 use crate::signal::LogCheck;
@@ -54,7 +54,7 @@ pub struct Args {
     #[command(flatten)]
     judging: VerdictFlags,
     #[command(flatten)]
-    reading: LogFlags,
+    reading: Reading,
 }
 
 /// Parameters and a log at rest, as the commands that hold one against the other read them.
@@ -79,12 +79,12 @@ impl Pair {
 }
 
 /// Reads both, prints the log check, and refuses to overwrite either with one of `outputs`, named with their flags.
-pub(super) fn read(params: &Path, log: &Path, reading: &LogFlags, outputs: &[Output<'_>]) -> anyhow::Result<Pair> {
+pub(super) fn read(params: &Path, log: &Path, reading: &Reading, outputs: &[Output<'_>]) -> anyhow::Result<Pair> {
     files::check(outputs, &[params, log])?;
     let given = given(params)?;
     let options = reading.options()?;
     let (recording, check) = crate::input::read(log, &options)?;
-    print_check(&recording.name, &check);
+    note_check(&recording.name, &check);
     let mut params = of_quantity(given, recording.quantity, params)?;
     let parts = stretches(&recording, options.kind);
     let unit =

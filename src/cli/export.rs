@@ -8,11 +8,11 @@ use anyhow::{Context, anyhow, bail};
 
 use super::Status;
 use super::files::{self, Kind};
-use super::flags::with_unit;
 use super::output::{print_report, print_text, say};
-use crate::cli::checked;
 use crate::export::atomic;
 use crate::export::consumer::{Choice, Export, Target, Walk, write};
+use crate::ops::amounts::with_unit;
+use crate::ops::checked;
 use crate::params::Params;
 use crate::units::{Dimension, Quantity, digits};
 use crate::view;

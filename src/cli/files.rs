@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use serde::Serialize;
 
+use super::output::with_flags;
 use crate::export::atomic;
 use crate::report::{Report, html};
 

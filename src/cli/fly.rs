@@ -7,10 +7,10 @@ use anyhow::bail;
 
 use super::Status;
 use super::files::{self, Kind};
-use super::flags::{whole, with_unit};
 use super::output::{print_json, print_report};
 use crate::aircraft::flight::{FlightDocument, Plan, RowSink, Times, fly};
 use crate::export::table::TableWriter;
+use crate::ops::amounts::{whole, with_unit};
 use crate::report::figure::Envelope;
 use crate::units::Dimension;
 use crate::view;

@@ -7,10 +7,10 @@ use anyhow::{Context, bail};
 use super::Status;
 use super::compare::read;
 use super::files::Kind;
-use super::log_flags::LogFlags;
 use super::output::{print_json, print_report};
 use crate::compare::inflation::{inflated, inflation, usual_from_hz};
 use crate::export::atomic;
+use crate::ops::reading::Reading;
 use crate::view;
 
 /// How many times louder than on the bench: the factor that vibration puts on white noise
@@ -33,7 +33,7 @@ pub struct Args {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
-    reading: LogFlags,
+    reading: Reading,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {

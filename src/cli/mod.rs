@@ -3,22 +3,18 @@
 //! Exit status: 0 done and consistent; 1 done, but a stated check failed or could not be judged; 2 could not do it, with one clear line.
 //! It is that of the work, once known, whatever happens to stdout or stderr.
 
-mod aid_columns;
 pub mod airplane;
 pub mod allan;
-mod checked;
 pub mod compare;
 pub mod completions;
 pub mod datasheet;
 pub mod export;
 mod files;
-mod flags;
 pub mod fly;
 pub mod identify;
 pub mod import;
 pub mod inflate;
 pub mod info;
-pub mod log_flags;
 pub mod man;
 pub mod montecarlo;
 pub mod output;
@@ -27,10 +23,8 @@ pub mod replay;
 pub mod schema;
 pub mod simulate;
 mod stop;
-mod stretch;
 pub mod trim;
 pub mod tune;
-mod windows;
 
 use std::process::ExitCode;
 
@@ -122,7 +116,7 @@ pub fn main(stop: &Stop) -> ExitCode {
         }
     };
     find_threads();
-    let result = match cli.command {
+    let command = || match cli.command {
         Command::Info(args) => info::run(&args),
         Command::Allan(args) => allan::run(&args),
         Command::Identify(args) => identify::run(&args),
@@ -144,6 +138,7 @@ pub fn main(stop: &Stop) -> ExitCode {
         Command::Completions(args) => completions::run(&args),
         Command::Man(args) => man::run(&args),
     };
+    let result = output::watched(command).unwrap_or_else(|stopped| Err(stopped.into()));
     ExitCode::from(exit_status(match result {
         Ok(Status::Done) => 0,
         Ok(Status::CheckFailed) => 1,

@@ -10,10 +10,8 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, bail};
 
 use super::files::{self, Kind};
-use super::flags::{whole, with_unit};
-use super::output::{print_report, print_text, progress, with_bar};
+use super::output::{print_report, print_text};
 use super::{Status, Stop, VerdictFlags};
-use crate::cli::checked;
 use crate::export::{atomic, junit};
 use crate::montecarlo::calibration::{self, MAX_REPLICATES, MAX_RUN, REPLICATES};
 use crate::montecarlo::course::{MAX_STEPS, MIN_STEPS};
@@ -23,6 +21,9 @@ use crate::montecarlo::experiment::default_steps;
 use crate::montecarlo::gate::Gate;
 use crate::montecarlo::power::{self, Mistuning};
 use crate::montecarlo::{Course, Experiment, Outcome, Runs, Totals, conclude};
+use crate::numerics::progress::{advance, begin};
+use crate::ops::amounts::{whole, with_unit};
+use crate::ops::checked;
 use crate::units::{Dimension, digits};
 use crate::view;
 use crate::view::montecarlo::MonteCarlo;
@@ -219,9 +220,8 @@ fn many_runs(args: &Args, experiment: &Experiment, course: &Course, stop: &Stop)
         }
     };
     let axes = course.axes.len() as u64;
-    let bar = progress((runs.end - runs.start) * axes, "runs");
-    bar.set_position((next - runs.start) * axes);
-    bar.reset_eta();
+    begin("runs", (runs.end - runs.start) * axes);
+    advance((next - runs.start) * axes);
     // what is there before is not given up for unfinished work, unless that goes on from it
     let kept = args.outputs.output.as_deref().filter(|path| args.resume || !path.exists());
     let mut saved = Instant::now();
@@ -238,7 +238,7 @@ fn many_runs(args: &Args, experiment: &Experiment, course: &Course, stop: &Stop)
         }
         stopping || failure.is_some()
     };
-    let (totals, end) = with_bar(bar, || course.sums_until(next..runs.end, start, &mut pause))?;
+    let (totals, end) = course.sums_until(next..runs.end, start, &mut pause);
     if let Some(failure) = failure {
         return Err(failure.into());
     }
@@ -331,19 +331,18 @@ impl Outputs {
         outcome.false_alarm_rate = Some(match experiment.replicates {
             0 => calibration::false_alarms(course, &gate, count),
             replicates => {
-                let bar = progress((replicates * count).saturating_mul(course.axes.len() as u64), "false alarms");
+                begin("false alarms", (replicates * count).saturating_mul(course.axes.len() as u64));
                 let own = experiment.own_course()?;
-                let rate = with_bar(bar, || calibration::false_alarms_of_experiments(&own, &gate, count, replicates))?;
-                rate
+                calibration::false_alarms_of_experiments(&own, &gate, count, replicates)
             }
         });
         if experiment.truth.is_some() && !experiment.truth_spread {
             outcome.rejection = power::rejection(course, &gate, count);
             if let Some(rejection) = outcome.rejection.as_mut().filter(|_| self.confirm > 0) {
-                let bar = progress((self.confirm * count).saturating_mul(course.axes.len() as u64), "confirm");
+                begin("confirm", (self.confirm * count).saturating_mul(course.axes.len() as u64));
                 let (axes, critical) = (&gate.axes, gate.critical);
-                let caught = || calibration::caught_of_experiments(course, axes, critical, count, self.confirm);
-                rejection.confirmed = Some(with_bar(bar, caught)?);
+                rejection.confirmed =
+                    Some(calibration::caught_of_experiments(course, axes, critical, count, self.confirm));
             }
         }
         let detects = experiment.truth.is_none() || self.power;
@@ -396,8 +395,8 @@ impl Outputs {
         if self.confirm > 0 {
             let sizes: usize =
                 outcome.detects.iter().map(|d| d.too_large.iter().count() + d.too_small.iter().count()).sum();
-            let bar = progress((self.confirm * runs).saturating_mul(sizes as u64), "confirm");
-            with_bar(bar, || power::confirm(experiment, course, gate, runs, self.confirm, &mut outcome.detects))??;
+            begin("confirm", (self.confirm * runs).saturating_mul(sizes as u64));
+            power::confirm(experiment, course, gate, runs, self.confirm, &mut outcome.detects)?;
         }
         let plan = |(number, what, size, wished): (usize, Mistuning, f64, &str)| {
             let needed = power::plan(experiment, course, gate, runs, number, &what, size)?;

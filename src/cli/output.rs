@@ -3,14 +3,14 @@
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::io::{ErrorKind, IsTerminal, Write};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use clap::CommandFactory;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use crate::export::atomic::in_words;
-use crate::numerics::progress::{Progress, Stopped, watched};
+use crate::numerics::progress::{self, Progress, Stopped};
 use crate::report::{Level, Report, terminal};
 
 /// Why stdout did not take all that was meant for it.
@@ -100,28 +100,54 @@ pub fn exit_status(work: u8) -> u8 {
     }
 }
 
-/// A progress bar on stderr: only on a terminal, and only for work that lasts over a second.
-pub fn progress(total: u64, what: &'static str) -> ProgressBar {
-    let bar = ProgressBar::new(total);
-    bar.set_draw_target(indicatif::ProgressDrawTarget::stderr_with_hz(5));
-    if let Ok(style) = ProgressStyle::with_template("{msg} [{bar:30}] {percent}% {eta} left") {
-        bar.set_style(style);
-    }
-    bar.set_message(what);
-    bar
+/// Notes on stderr, and progress bars: only on a terminal, and only for work that lasts over a second.
+#[derive(Default)]
+struct Terminal {
+    bar: Mutex<Option<ProgressBar>>,
 }
 
-/// The work with a bar that is moved on by [`crate::numerics::progress::advance`].
-pub fn with_bar<T: Send>(bar: ProgressBar, work: impl FnOnce() -> T + Send) -> Result<T, Stopped> {
-    struct Bar(ProgressBar);
-    impl Progress for Bar {
-        fn advance(&self, parts: u64) {
-            self.0.inc(parts);
+impl Terminal {
+    fn bar(&self) -> MutexGuard<'_, Option<ProgressBar>> {
+        self.bar.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn end(&self) {
+        if let Some(bar) = self.bar().take() {
+            bar.finish_and_clear();
         }
     }
-    let watch: Arc<dyn Progress> = Arc::new(Bar(bar.clone()));
-    let done = watched(&watch, work);
-    bar.finish_and_clear();
+}
+
+impl Progress for Terminal {
+    fn begin(&self, stage: &'static str, parts: u64) {
+        let bar = ProgressBar::new(parts);
+        bar.set_draw_target(indicatif::ProgressDrawTarget::stderr_with_hz(5));
+        if let Ok(style) = ProgressStyle::with_template("{msg} [{bar:30}] {percent}% {eta} left") {
+            bar.set_style(style);
+        }
+        bar.set_message(stage);
+        self.end();
+        *self.bar() = Some(bar);
+    }
+
+    fn advance(&self, parts: u64) {
+        if let Some(bar) = self.bar().as_ref() {
+            bar.inc(parts);
+        }
+    }
+
+    fn note(&self, line: &str) {
+        self.end();
+        say(line);
+    }
+}
+
+/// Runs a command: what it notes goes to stderr, how far it is to a bar.
+pub fn watched<T: Send>(command: impl FnOnce() -> T + Send) -> Result<T, Stopped> {
+    let terminal = Arc::new(Terminal::default());
+    let watch: Arc<dyn Progress> = Arc::clone(&terminal) as _;
+    let done = progress::watched(&watch, command);
+    terminal.end();
     done
 }
 

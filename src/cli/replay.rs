@@ -6,17 +6,18 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 
-use super::aid_columns::aid_columns;
 use super::files::{self, Kind};
-use super::flags::with_unit;
-use super::log_flags::{LogFlags, print_check};
-use super::output::{print_json, print_report, progress, say};
+use super::output::{print_json, print_report, say};
 use super::{Status, VerdictFlags};
-use crate::cli::checked;
 use crate::consistency::{Test, TestKind};
 use crate::export::table::TableWriter;
 use crate::filter::{AttitudeDesign, FilterDesign, Form};
 use crate::input::{Block, LogOptions, LogReader};
+use crate::numerics::progress::{advance, begin};
+use crate::ops::aid_columns::aid_columns;
+use crate::ops::amounts::with_unit;
+use crate::ops::checked;
+use crate::ops::reading::{Reading, note_check};
 use crate::replay::{Estimates, LogShape, Options, ReplayResult, Replayer};
 use crate::signal::check::FindingKind;
 use crate::units::Dimension;
@@ -78,7 +79,7 @@ pub struct Args {
     #[command(flatten)]
     attitude: attitude::Flags,
     #[command(flatten)]
-    reading: LogFlags,
+    reading: Reading,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -121,7 +122,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if design.plant != "static" {
         check.expect_motion();
     }
-    print_check(&name, &check);
+    note_check(&name, &check);
     let shape = LogShape {
         axes: reader.axes().iter().map(|a| a.name.clone()).collect(),
         quantity: reader.quantity(),
@@ -213,7 +214,7 @@ fn stream(
     if args.smooth {
         replayer.remember();
     }
-    let bar = progress(reader.check().samples, "replay");
+    begin("replay", reader.check().samples);
     let (mut block, mut estimates, mut time_s) = (Block::default(), Estimates::default(), Vec::new());
     while reader.next_block(&mut block)? {
         let streamed = writer.as_mut().filter(|_| !args.smooth);
@@ -224,9 +225,8 @@ fn stream(
         if args.smooth {
             time_s.extend_from_slice(&block.time_s);
         }
-        bar.inc(block.time_s.len() as u64);
+        advance(block.time_s.len() as u64);
     }
-    bar.finish_and_clear();
     if let Some(writer) = writer.as_mut().filter(|_| args.smooth) {
         let axes = replayer.smoothed();
         let mut all = vec![time_s.as_slice()];

@@ -2,7 +2,7 @@
 
 use clap::ValueEnum;
 
-use super::{Status, allan, identify, output, tune};
+use super::{Status, output, tune};
 use crate::aircraft::airframe::AirplaneDocument;
 use crate::aircraft::airframe::check::AirplaneCheck;
 use crate::aircraft::control::document::LinearDocument;
@@ -14,6 +14,7 @@ use crate::filter::{AttitudeDesign, FilterDesign};
 use crate::identify::log_plan::LogPlan;
 use crate::input::inspect::Inventory;
 use crate::montecarlo;
+use crate::ops::{allan, identify};
 use crate::params::Params;
 use crate::replay::ReplayResult;
 use crate::replay::attitude::AttitudeReplay;

@@ -6,13 +6,14 @@ use anyhow::{Context, anyhow, bail};
 
 use super::Status;
 use super::files::{self, Kind};
-use super::flags::{whole, with_unit};
-use super::output::{print_json, print_report, progress, say};
+use super::output::{print_json, print_report, say};
 use super::tune::plant_flags::PlantFlags;
-use crate::cli::checked;
 use crate::export::table::TableWriter;
 use crate::input::{self, LogOptions};
+use crate::numerics::progress::{advance, begin};
 use crate::numerics::reduce::Moments;
+use crate::ops::amounts::{whole, with_unit};
+use crate::ops::checked;
 use crate::params::{AxisParams, Design, Params, PlantEntry, TermEntry};
 use crate::simulate::{AxisBlock, AxisSummary, Flight, FlightBlock, Scenario, Simulator, Summary, TrueRate};
 use crate::units::{Dimension, Quantity, Unit, shown_unit};
@@ -100,7 +101,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let mut shape = Shape::new(&scenario, unit, plant, args);
     let mut moments = vec![(Moments::default(), 0); params.axes.len()];
     let (mut blocks, mut flown) = (Vec::new(), Vec::new());
-    let bar = progress(scenario.samples, "simulating");
+    begin("simulating", scenario.samples);
     loop {
         let n = simulator.next_block(BLOCK, &mut blocks);
         if n == 0 {
@@ -114,9 +115,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
             flight.next_block(&blocks, &mut flown);
         }
         writer.write(&shape.columns(n, &blocks, &flown))?;
-        bar.inc(n as u64);
+        advance(n as u64);
     }
-    bar.finish_and_clear();
     writer.finish()?;
     let axes = names
         .into_iter()

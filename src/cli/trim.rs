@@ -6,12 +6,12 @@ use anyhow::{Context, anyhow, bail};
 
 use super::Status;
 use super::files::{self, Kind};
-use super::flags::with_unit;
 use super::output::{print_json, print_report};
 use crate::aircraft::airframe::Airplane;
 use crate::aircraft::airframe::trim::{Sideways, TrimRequest, Turn};
 use crate::aircraft::control::document::Linearized;
 use crate::aircraft::flight::FlightDocument;
+use crate::ops::amounts::with_unit;
 use crate::units::Dimension;
 use crate::view;
 

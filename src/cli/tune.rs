@@ -13,19 +13,20 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::json;
 
-use self::logs::Reading;
+use self::logs::Logs;
 use self::objective::{ObjectiveArg, ObjectiveFlags};
 use self::plant_flags::PlantFlags;
 use super::files::{self, Kind};
-use super::flags::whole;
-use super::log_flags::LogFlags;
-use super::output::{print_json, print_report, progress, say, with_bar};
+use super::output::{print_json, print_report, say};
 use super::{Status, VerdictFlags};
-use crate::cli::checked;
 use crate::consistency::Verdict;
 use crate::export::atomic;
 use crate::filter::FilterDesign;
 use crate::montecarlo::{Outcome, Plan, verify};
+use crate::numerics::progress::begin;
+use crate::ops::amounts::whole;
+use crate::ops::checked;
+use crate::ops::reading::Reading;
 use crate::params::{Params, PlantEntry};
 use crate::replay::ReplayResult;
 use crate::tune::objective::{Objective, Record, Request, tune_by};
@@ -79,7 +80,7 @@ pub struct Args {
     #[command(flatten)]
     plant: PlantFlags,
     #[command(flatten)]
-    reading: LogFlags,
+    reading: Reading,
 }
 
 /// What `tune --json` prints.
@@ -101,7 +102,7 @@ pub(super) struct Printed<'a> {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
-    let reading = Reading { flags: &args.reading, aids: &args.plant.columns() };
+    let reading = Logs { reading: &args.reading, aids: &args.plant.columns() };
     let params_path = match &args.params {
         Some(path) if args.choosing.compare.is_empty() => path,
         Some(path) => bail!("--compare ranks designs and makes none: leave out {}", path.display()),
@@ -127,8 +128,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let truth = args.truth.as_deref().map(|path| Truth::read(path, &tuned, &options)).transpose()?;
     let plan = Plan { runs: args.runs, seed: args.seed, ..Plan::quick(params.sample_rate_hz) };
     let insights = if args.insight { insight(&tuned, &options)? } else { Vec::new() };
-    let bar = progress(plan.runs * tuned.design.axes.len() as u64, "verify");
-    let verification = with_bar(bar, || verify(&tuned.design, &plan))??;
+    begin("verify", plan.runs * tuned.design.axes.len() as u64);
+    let verification = verify(&tuned.design, &plan)?;
     if let Some(record) = tuned.design.tuning.as_object_mut() {
         let summary = json!({
             "verdict": verification.verdict, "alpha": verification.alpha, "runs": verification.runs.count(),
@@ -196,7 +197,7 @@ fn chosen(
     args: &Args,
     params: &Params,
     options: &TuneOptions,
-    reading: &Reading<'_>,
+    reading: &Logs<'_>,
 ) -> anyhow::Result<(Tuned, Option<Record>)> {
     let flags = &args.choosing;
     let truth = args.truth.as_deref().filter(|_| flags.objective.objective() == Objective::Nees);

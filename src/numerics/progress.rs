@@ -21,6 +21,9 @@ pub trait Progress: Send + Sync {
     /// So many more of its parts are done.
     fn advance(&self, _parts: u64) {}
 
+    /// A line about what the work was given: a check of a log, a column that was chosen.
+    fn note(&self, _line: &str) {}
+
     /// Whether the work should end. Asked every few milliseconds by every thread, so it should do next to nothing.
     fn is_stopped(&self) -> bool {
         false
@@ -78,6 +81,11 @@ pub fn begin(stage: &'static str, parts: u64) {
 /// So many more parts of the stage are done.
 pub fn advance(parts: u64) {
     WATCH.with_borrow(|watch| watch.iter().for_each(|watch| watch.advance(parts)));
+}
+
+/// A line about what the work was given. Nobody hears it where nobody waits: what matters is in the result, too.
+pub fn note(line: &str) {
+    WATCH.with_borrow(|watch| watch.iter().for_each(|watch| watch.note(line)));
 }
 
 /// Whether this is the end of work that was asked to stop: who catches panics hands it on.

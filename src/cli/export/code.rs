@@ -9,10 +9,10 @@ use super::super::Status;
 use super::super::files;
 use super::super::output::{print_report, print_text};
 use super::{Args, TargetFlag};
-use crate::cli::checked;
 use crate::export::atomic::{self, AtomicFile};
 use crate::export::code::{self, Code, Gain, Precision, Source};
 use crate::input::sha256;
+use crate::ops::checked;
 use crate::view;
 
 /// Of the code.

@@ -4,14 +4,15 @@ use anyhow::{Context, bail};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::{Args, FormFlag, Status};
-use crate::cli::aid_columns::column_and_unit;
-use crate::cli::checked;
-use crate::cli::log_flags::print_check;
-use crate::cli::output::{print_json, print_report, progress};
+use crate::cli::output::{print_json, print_report};
 use crate::export::table::TableWriter;
 use crate::filter::AttitudeDesign;
 use crate::filter::attitude::{Heading, Row};
 use crate::input::{Block, ExtraColumn, LogOptions, LogReader};
+use crate::numerics::progress::{advance, begin};
+use crate::ops::aid_columns::column_and_unit;
+use crate::ops::checked;
+use crate::ops::reading::note_check;
 use crate::params::Measured;
 use crate::replay::LogShape;
 use crate::replay::attitude::{AttitudeEstimate, AttitudeReplayer, LogRow, Reference};
@@ -84,7 +85,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let name = args.log.display().to_string();
     let mut check = reader.check().clone();
     check.expect_motion();
-    print_check(&name, &check);
+    note_check(&name, &check);
     let shape = LogShape {
         axes: reader.axes().iter().map(|a| a.name.clone()).collect(),
         quantity: reader.quantity(),
@@ -99,7 +100,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         None => None,
     };
     let mut replayer = AttitudeReplayer::new(&design, reference);
-    let bar = progress(reader.check().samples, "replay");
+    begin("replay", reader.check().samples);
     let (mut block, mut table) = (Block::default(), vec![Vec::new(); 14]);
     while reader.next_block(&mut block)? {
         table.iter_mut().for_each(Vec::clear);
@@ -112,9 +113,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         if let Some(writer) = &mut writer {
             writer.write(&table.iter().map(Vec::as_slice).collect::<Vec<_>>())?;
         }
-        bar.inc(block.time_s.len() as u64);
+        advance(block.time_s.len() as u64);
     }
-    bar.finish_and_clear();
     let mut result = replayer.finish();
     if result.specific_force.samples == 0 {
         bail!(

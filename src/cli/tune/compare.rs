@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 
-use super::logs::{Opened, Reading};
+use super::logs::{Logs, Opened};
 use crate::cli::Status;
-use crate::cli::checked;
 use crate::cli::output::{print_json, print_report};
 use crate::compare::designs::{Contest, RankError};
 use crate::filter::FilterDesign;
 use crate::input::InputError;
+use crate::ops::checked;
 use crate::params::{Params, place};
 use crate::tune::{TuneOptions, tune};
 use crate::view;
@@ -20,7 +20,7 @@ pub(super) fn run(
     held_out: f64,
     json: bool,
     options: &TuneOptions,
-    reading: &Reading<'_>,
+    reading: &Logs<'_>,
 ) -> anyhow::Result<Status> {
     crate::cli::files::check(&[], &files.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
     if !(held_out > 0.0 && held_out <= 0.9) {

@@ -4,19 +4,19 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 
-use crate::cli::aid_columns::aid_columns;
-use crate::cli::log_flags::{LogFlags, print_check};
-use crate::cli::output::progress;
 use crate::filter::{FilterDesign, SensorLog};
 use crate::input::{Block, LogOptions, LogReader};
 use crate::model::LinearModel;
+use crate::numerics::progress::{advance, begin};
+use crate::ops::aid_columns::aid_columns;
+use crate::ops::reading::{Reading, note_check};
 use crate::replay::axes::assign;
 use crate::replay::{LogShape, Options, ReplayResult, Replayer};
 use crate::tune::objective::Log;
 
-/// How logs are read: the flags, and the columns of the aids.
-pub(super) struct Reading<'a> {
-    pub(super) flags: &'a LogFlags,
+/// How logs are read, and the columns of the aids.
+pub(super) struct Logs<'a> {
+    pub(super) reading: &'a Reading,
     pub(super) aids: &'a [String],
 }
 
@@ -27,18 +27,18 @@ pub(super) struct Opened {
     pub(super) shape: LogShape,
 }
 
-impl Reading<'_> {
+impl Logs<'_> {
     pub(super) fn open(&self, path: &Path, design: &FilterDesign) -> anyhow::Result<Opened> {
         let name = path.display().to_string();
         let extra = aid_columns(self.aids, design)?;
         let aids = extra.len();
-        let reader = LogReader::open(path, &LogOptions { extra, ..self.flags.rates()? })?;
+        let reader = LogReader::open(path, &LogOptions { extra, ..self.reading.rates()? })?;
         let mut check = reader.check().clone();
         // a plant's log is one that moves
         if design.plant != "static" {
             check.expect_motion();
         }
-        print_check(&name, &check);
+        note_check(&name, &check);
         let shape = LogShape {
             axes: reader.axes().iter().map(|a| a.name.clone()).collect(),
             quantity: reader.quantity(),
@@ -78,12 +78,11 @@ impl Reading<'_> {
         let Opened { name, mut reader, shape } = self.open(path, design)?;
         let mut replayer = Replayer::new(design, &shape, Options::default()).with_context(|| name.clone())?;
         let mut block = Block::default();
-        let bar = progress(reader.check().samples, "replay");
+        begin("replay", reader.check().samples);
         while reader.next_block(&mut block)? {
             replayer.push(&block, None);
-            bar.inc(block.time_s.len() as u64);
+            advance(block.time_s.len() as u64);
         }
-        bar.finish_and_clear();
         let mut result = replayer.finish();
         result.log = Some(name);
         result.log_sha256 = Some(reader.sha256().to_string());

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
 
-use crate::cli::checked;
+use crate::ops::checked;
 use crate::params::{
     AidDrift, AidEntry, AttitudeEntry, AxisParams, Design, Measured, MotionEntry, Params, PlantEntry, check_name,
     unknown_plant,

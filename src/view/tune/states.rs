@@ -1,8 +1,8 @@
 //! States, loop and error budgets of a design in numbers.
 
 use super::Group;
-use crate::noise::Kind;
 use crate::model::{DRIFT, LinearModel};
+use crate::noise::Kind;
 use crate::report::Section;
 use crate::tune::Share;
 use crate::units::digits;

@@ -1,17 +1,20 @@
-//! The flags every command that takes LOG has, and the log check printed in one form.
+//! How a log is read: of every request that takes one.
 
 use clap::{Args, ValueEnum};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-use super::flags::with_unit;
-use super::output::say;
+use super::amounts::with_unit;
 use crate::input::{InputKind, LogOptions, TemperatureColumn};
+use crate::numerics::progress::note;
 use crate::signal::LogCheck;
 use crate::units::{Dimension, Quantity, Unit};
 
 /// How to read LOG.
-#[derive(Clone, Debug, Default, Args)]
+#[derive(Clone, Debug, Default, Args, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
 #[command(next_help_heading = "Reading the log")]
-pub struct LogFlags {
+pub struct Reading {
     /// Columns to use: names or 1-based numbers, comma separated [default: found by name]
     #[arg(long, value_delimiter = ',', value_name = "COLUMNS")]
     pub columns: Option<Vec<String>>,
@@ -41,7 +44,8 @@ pub struct LogFlags {
     pub sensor: Option<SensorArg>,
 }
 
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, ValueEnum, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum InputArg {
     /// Angular rate or specific force
     #[default]
@@ -52,14 +56,15 @@ pub enum InputArg {
     Angle,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, ValueEnum, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum SensorArg {
     Gyro,
     Accel,
 }
 
-impl LogFlags {
-    /// As [`LogFlags::options`], for what reads sample by sample and knows rates alone.
+impl Reading {
+    /// As [`Reading::options`], for what reads sample by sample and knows rates alone.
     pub fn rates(&self) -> anyhow::Result<LogOptions> {
         let flag = match self.input {
             InputArg::Rate => return self.options(),
@@ -67,7 +72,7 @@ impl LogFlags {
             InputArg::Angle => "angle",
         };
         anyhow::bail!(
-            "--input {flag}: a filter runs on rates, sample by sample; write the log as rates first (increments, or differences of angles, over the sample period)"
+            "`input` {flag}: a filter runs on rates, sample by sample; write the log as rates first (increments, or differences of angles, over the sample period)"
         )
     }
 
@@ -77,10 +82,10 @@ impl LogFlags {
             columns: self.columns.clone(),
             topic: self.topic.clone(),
             time: self.time.clone(),
-            unit: self.unit.as_deref().map(Unit::parse).transpose().map_err(|e| anyhow::anyhow!("--unit: {e}"))?,
+            unit: self.unit.as_deref().map(Unit::parse).transpose().map_err(|e| anyhow::anyhow!("`unit`: {e}"))?,
             rate_hz: self.rate,
-            start_s: self.start.as_deref().map(|text| seconds("--start", text)).transpose()?,
-            end_s: self.end.as_deref().map(|text| seconds("--end", text)).transpose()?,
+            start_s: self.start.as_deref().map(|text| seconds("`start`", text)).transpose()?,
+            end_s: self.end.as_deref().map(|text| seconds("`end`", text)).transpose()?,
             no_digest: false,
             kind: match self.input {
                 InputArg::Rate => InputKind::Rate,
@@ -105,9 +110,9 @@ fn seconds(flag: &str, text: &str) -> anyhow::Result<f64> {
     }
 }
 
-/// The log check on stderr, one line a finding.
-pub fn print_check(name: &str, check: &LogCheck) {
-    say(&format!(
+/// The log check as notes, one line a finding.
+pub fn note_check(name: &str, check: &LogCheck) {
+    note(&format!(
         "{name}: {} samples at {:.6} Hz, {:.1} s{}",
         check.samples,
         check.sample_rate_hz,
@@ -115,6 +120,6 @@ pub fn print_check(name: &str, check: &LogCheck) {
         if check.findings.is_empty() { ", nothing unusual" } else { "" }
     ));
     for finding in &check.findings {
-        say(&format!("  {}: {}", if finding.serious { "warning" } else { "note" }, finding.message));
+        note(&format!("  {}: {}", if finding.serious { "warning" } else { "note" }, finding.message));
     }
 }

@@ -1,39 +1,39 @@
-//! `kfdesign identify` in windows.
+//! `identify` in windows.
 
 use anyhow::bail;
 
-use super::{Args, Log, MethodArg, holds_of};
+use super::{Log, MethodArg, Request, holds_of};
 use crate::allan::AxisCurve;
-use crate::cli::stretch;
-use crate::cli::windows::{Windows, note};
 use crate::identify::windows::Windows as Likelihoods;
 use crate::identify::{Hold, IdentifiedAxis, ModelChoice};
 use crate::input::{LogOptions, TemperatureColumn};
+use crate::ops::stretch;
+use crate::ops::windows::{Windows, note};
 
 /// The axes in windows, if `--window` or the size of the file asks for it.
 pub(super) fn axes(
-    args: &Args,
+    request: &Request,
     choice: &ModelChoice,
     holds: &[Hold],
     options: &LogOptions,
 ) -> anyhow::Result<Option<(Log, Vec<IdentifiedAxis>)>> {
     let other = match () {
-        () if args.method != MethodArg::Likelihood => Some("--method likelihood"),
-        () if args.logs.len() > 1 => Some("one log"),
-        () if args.robust => Some("a log without --robust"),
-        () if args.temperature.as_deref().is_some_and(|column| column.trim() != "none") => {
-            Some("a log without --temperature")
+        () if request.method != MethodArg::Likelihood => Some("`method` likelihood"),
+        () if request.logs.len() > 1 => Some("one log"),
+        () if request.robust => Some("a log without `robust`"),
+        () if request.temperature.as_deref().is_some_and(|column| column.trim() != "none") => {
+            Some("a log without `temperature`")
         }
         () => None,
     };
     if let Some(other) = other {
-        if let Some(window) = &args.window {
-            bail!("--window {window}: only {other} is identified in windows");
+        if let Some(window) = &request.window {
+            bail!("`window` {window}: only {other} is identified in windows");
         }
         return Ok(None);
     }
     let options = &LogOptions { temperature: TemperatureColumn::Ignored, ..options.clone() };
-    let Some(windows) = Windows::open(&args.logs[0], args.window.as_deref(), options)? else { return Ok(None) };
+    let Some(windows) = Windows::open(&request.logs[0], request.window.as_deref(), options)? else { return Ok(None) };
     let (samples, dt, axes, length) = (windows.samples, windows.dt, windows.axes(), windows.length());
     let log = Log {
         name: windows.name.clone(),

@@ -1,10 +1,10 @@
 //! The temperature of the logs.
 
-use crate::cli::output::say;
-use crate::cli::stretch::Stretch;
 use crate::identify::temperature::{Regressor, Smoothed, effect, smoothed};
 use crate::identify::{Fitted, OnTemperature};
 use crate::input::InputKind;
+use crate::numerics::progress::note;
+use crate::ops::stretch::Stretch;
 use crate::params::Measured;
 use crate::signal::{Gap, LogCheck, Recording};
 use crate::units::Unit;
@@ -33,7 +33,7 @@ impl Temperature {
         let first = *columns.first()?;
         let unit = first.unit.times_time(0);
         if columns.len() < readings.len() || columns.iter().any(|other| other.unit.times_time(0) != unit) {
-            say(&format!("  note: the logs do not all have a temperature in {unit}: there is no regression on it"));
+            note(&format!("  note: the logs do not all have a temperature in {unit}: there is no regression on it"));
             return None;
         }
         let mut logs: Vec<(Smoothed, Vec<Gap>)> = readings

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use anyhow::bail;
 
-use super::flags::with_unit;
-use super::log_flags::print_check;
+use super::amounts::with_unit;
+use super::reading::note_check;
 use crate::input::{Block, InputKind, LogOptions, LogReader};
 use crate::signal::LogCheck;
 use crate::units::{Dimension, Quantity, Unit, digits};
@@ -18,65 +18,65 @@ const SAMPLES: usize = 10_000_000;
 const FEWEST: f64 = 30.0;
 
 /// An open log and how it is cut.
-pub(super) struct Windows {
-    pub(super) name: String,
-    pub(super) check: LogCheck,
+pub(crate) struct Windows {
+    pub(crate) name: String,
+    pub(crate) check: LogCheck,
     /// Of a window.
-    pub(super) samples: usize,
+    pub(crate) samples: usize,
     /// s.
-    pub(super) dt: f64,
+    pub(crate) dt: f64,
     kind: InputKind,
     reader: LogReader,
 }
 
 impl Windows {
     /// `None` unless `--window` or the size of the file asks for it. Prints the log check.
-    pub(super) fn open(log: &Path, window: Option<&str>, options: &LogOptions) -> anyhow::Result<Option<Windows>> {
+    pub(crate) fn open(log: &Path, window: Option<&str>, options: &LogOptions) -> anyhow::Result<Option<Windows>> {
         let seconds = match window {
-            Some(text) => Some(with_unit("--window", text, Dimension::TIME, "24h")?),
+            Some(text) => Some(with_unit("`window`", text, Dimension::TIME, "24h")?),
             None if file_size(log) > LARGE_FILE => None,
             None => return Ok(None),
         };
         let reader = LogReader::open(log, options)?;
         let check = reader.check().clone();
         let name = log.file_name().map_or_else(|| log.display().to_string(), |n| n.to_string_lossy().into_owned());
-        print_check(&name, &check);
+        note_check(&name, &check);
         let dt = 1.0 / check.sample_rate_hz;
         let samples = match seconds {
             Some(seconds) => {
                 let samples = (seconds / dt).round();
                 if samples.is_nan() || samples < FEWEST {
                     let text = window.unwrap_or_default();
-                    bail!("--window {text}: expected at least {FEWEST} samples: {} s", digits(FEWEST * dt));
+                    bail!("`window` {text}: expected at least {FEWEST} samples: {} s", digits(FEWEST * dt));
                 }
                 samples as usize
             }
             None => SAMPLES,
         };
         if samples as u64 > check.samples {
-            bail!("{name}: {} samples are fewer than a window of {samples}; choose a shorter --window", check.samples);
+            bail!("{name}: {} samples are fewer than a window of {samples}; choose a shorter `window`", check.samples);
         }
         Ok(Some(Windows { name, check, samples, dt, kind: options.kind, reader }))
     }
 
-    pub(super) fn quantity(&self) -> Quantity {
+    pub(crate) fn quantity(&self) -> Quantity {
         self.reader.quantity()
     }
 
     /// Hex SHA-256 of the file.
-    pub(super) fn sha256(&self) -> &str {
+    pub(crate) fn sha256(&self) -> &str {
         self.reader.sha256()
     }
 
     /// Name of every axis and the unit of its rate.
-    pub(super) fn axes(&self) -> Vec<(String, Unit)> {
+    pub(crate) fn axes(&self) -> Vec<(String, Unit)> {
         let unit = |unit: &Unit| if self.kind == InputKind::Rate { unit.clone() } else { unit.times_time(-2) };
         self.reader.axes().iter().map(|axis| (axis.name.clone(), unit(&axis.unit))).collect()
     }
 
     /// Hands every window of every axis to `take` as it is complete: rates, increments or (one more of them) angles. Gives the samples of each axis
     /// that are in no window: windows do not reach over gaps and unusable samples, one begins anew behind them.
-    pub(super) fn read(
+    pub(crate) fn read(
         mut self,
         mut take: impl FnMut(usize, &[f64]) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<u64>> {
@@ -109,16 +109,16 @@ impl Windows {
     }
 
     /// Length of a window in s, as text.
-    pub(super) fn length(&self) -> String {
+    pub(crate) fn length(&self) -> String {
         digits(self.samples as f64 * self.dt)
     }
 }
 
 /// What of an axis was used, or that nothing was.
-pub(super) fn note(axis: &str, windows: u64, length: &str, left_out: u64, joined: &str) -> anyhow::Result<String> {
+pub(crate) fn note(axis: &str, windows: u64, length: &str, left_out: u64, joined: &str) -> anyhow::Result<String> {
     if windows == 0 {
         bail!(
-            "{axis}: no window of {length} s without gaps and unusable samples fits in the log; choose a shorter --window"
+            "{axis}: no window of {length} s without gaps and unusable samples fits in the log; choose a shorter `window`"
         );
     }
     let mut note = format!("read in {windows} windows of {length} s, {joined}");

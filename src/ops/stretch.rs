@@ -14,20 +14,20 @@ use crate::units::Unit;
 
 /// One axis, SI.
 #[derive(Clone, Debug)]
-pub(super) struct Stretch {
-    pub(super) name: String,
+pub(crate) struct Stretch {
+    pub(crate) name: String,
     /// Unit of the rate in the spelling of the log.
-    pub(super) unit: Unit,
+    pub(crate) unit: Unit,
     /// Uniform and finite.
-    pub(super) rate: Vec<f64>,
+    pub(crate) rate: Vec<f64>,
     /// The integral itself when the log holds it: one value more than `rate`.
-    pub(super) phase: Option<Vec<f64>>,
+    pub(crate) phase: Option<Vec<f64>>,
     /// Samples of the log outside the stretch.
-    pub(super) left_out: usize,
+    pub(crate) left_out: usize,
     /// How many of `rate` are filled in.
-    pub(super) filled: usize,
+    pub(crate) filled: usize,
     /// Which of `rate` stand in the place of outliers.
-    pub(super) outliers: Vec<usize>,
+    pub(crate) outliers: Vec<usize>,
     /// Where the stretch is in the log, or in its pieces laid out with their holes.
     range: Range<usize>,
     /// The whole log: how many samples are missing before, then samples, of which some may not be finite; empty where `rate` is all.
@@ -36,7 +36,7 @@ pub(super) struct Stretch {
 
 impl Stretch {
     /// Takes a longer stretch, if there is one whose holes are few and short enough to be filled in.
-    pub(super) fn bridge(&mut self) {
+    pub(crate) fn bridge(&mut self) {
         if self.whole.is_empty() {
             return;
         }
@@ -51,7 +51,7 @@ impl Stretch {
     }
 
     /// Outliers count as missing; how many there are in all. Methods that cannot do without a sample get the median of its surroundings.
-    pub(super) fn drop_outliers(&mut self) -> usize {
+    pub(crate) fn drop_outliers(&mut self) -> usize {
         if self.whole.is_empty() {
             self.whole = vec![(0, self.rate.clone())];
         }
@@ -69,7 +69,7 @@ impl Stretch {
     }
 
     /// To hold a noise model against, with short holes filled in at rest: what a motion did in a hole is not known. And what is left out of curves and spectra, in words.
-    pub(super) fn into_log_axis(mut self, at_rest: bool) -> (LogAxis, Option<String>) {
+    pub(crate) fn into_log_axis(mut self, at_rest: bool) -> (LogAxis, Option<String>) {
         if at_rest {
             self.bridge();
         }
@@ -79,7 +79,7 @@ impl Stretch {
     }
 
     /// What of the log is outside the stretch, if anything is; `role`: of the stretch.
-    pub(super) fn left_out_note(&self, role: &str) -> Option<String> {
+    pub(crate) fn left_out_note(&self, role: &str) -> Option<String> {
         let (used, left_out) = (self.rate.len(), self.left_out);
         let note = || match self.filled {
             0 => format!(
@@ -93,7 +93,7 @@ impl Stretch {
     }
 
     /// What stands beside the samples of the axis in the log: beside the stretch, and piece by piece as [`Stretch::pieces`].
-    pub(super) fn beside(&self, values: &[f64], gaps: &[Gap], kind: InputKind) -> (Vec<f64>, Vec<Vec<f64>>) {
+    pub(crate) fn beside(&self, values: &[f64], gaps: &[Gap], kind: InputKind) -> (Vec<f64>, Vec<Vec<f64>>) {
         if self.whole.is_empty() || (self.left_out == 0 && self.filled == 0) {
             let own = beside(values.get(self.range.clone()).unwrap_or_default(), kind);
             return (own.clone(), vec![own]);
@@ -116,7 +116,7 @@ impl Stretch {
     }
 
     /// All of the log, piece by piece.
-    pub(super) fn pieces(&self) -> Vec<filter::likelihood::Stretch<'_>> {
+    pub(crate) fn pieces(&self) -> Vec<filter::likelihood::Stretch<'_>> {
         let piece = |missing, samples| filter::likelihood::Stretch { missing, samples };
         match &self.whole[..] {
             [] => vec![piece(0, &self.rate)],
@@ -126,13 +126,13 @@ impl Stretch {
 }
 
 /// The stretches of all axes; increments are divided by the sample period, angles differenced and divided.
-pub(super) fn stretches(recording: &Recording, kind: InputKind) -> Vec<Stretch> {
+pub(crate) fn stretches(recording: &Recording, kind: InputKind) -> Vec<Stretch> {
     let of = |axis: &Axis| stretch(&axis.name, &axis.unit, Cow::Borrowed(&axis.values), recording, kind);
     recording.axes.par_iter().map(of).collect()
 }
 
 /// The same, leaving no axes: a rate in one piece is not copied.
-pub(super) fn into_stretches(recording: &mut Recording, kind: InputKind) -> Vec<Stretch> {
+pub(crate) fn into_stretches(recording: &mut Recording, kind: InputKind) -> Vec<Stretch> {
     let axes = std::mem::take(&mut recording.axes);
     let of = |axis: Axis| stretch(&axis.name, &axis.unit, Cow::Owned(axis.values), recording, kind);
     axes.into_par_iter().map(of).collect()
@@ -153,7 +153,7 @@ fn stretch(name: &str, unit: &Unit, values: Cow<'_, [f64]>, recording: &Recordin
 }
 
 /// Increments and angles as rate.
-pub(super) fn rate(values: &[f64], kind: InputKind, dt: f64) -> Vec<f64> {
+pub(crate) fn rate(values: &[f64], kind: InputKind, dt: f64) -> Vec<f64> {
     match kind {
         InputKind::Rate => values.to_vec(),
         InputKind::Increments => values.iter().map(|v| v / dt).collect(),

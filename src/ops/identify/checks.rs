@@ -1,11 +1,7 @@
 //! What of the log check and of the fits is a failed check.
 
-use std::path::Path;
-
-use crate::cli::Status;
-use crate::cli::output::say;
 use crate::identify::IdentifiedAxis;
-use crate::params::{Check, CheckKind, Params};
+use crate::params::{Check, CheckKind};
 use crate::signal::LogCheck;
 use crate::signal::check::FindingKind;
 
@@ -32,12 +28,4 @@ pub(super) fn checks(logs: &[LogCheck], axes: &[IdentifiedAxis]) -> Vec<Check> {
     let motion = named(FindingKind::Motion, CheckKind::Motion);
     let calm = named(FindingKind::Calm, CheckKind::Calm);
     motion.chain(calm).chain(axes.iter().filter_map(|axis| axis.found.missed())).collect()
-}
-
-/// A failed check is said on stderr, in one line.
-pub(super) fn status(params: &Params, output: Option<&Path>) -> Status {
-    let Some(failed) = params.failed_check() else { return Status::Done };
-    let kept = output.map_or_else(String::new, |path| format!(", kept in {}", path.display()));
-    say(&format!("check failed: {failed} (exit status 1{kept})"));
-    Status::CheckFailed
 }

@@ -1,16 +1,20 @@
-//! `kfdesign allan` in windows.
+//! Allan deviations in windows.
 
 use anyhow::Context;
 
-use super::{Args, Header};
+use super::{Header, Request};
 use crate::allan::{AxisCurve, Deviation, Pooled, TauGrid, deviation};
-use crate::cli::windows::{Windows, note};
 use crate::identify::allan_fit;
 use crate::input::{InputKind, LogOptions};
+use crate::ops::windows::{Windows, note};
 
 /// The curves in windows, if `--window` or the size of the file asks for them.
-pub(super) fn axes(args: &Args, options: &LogOptions) -> anyhow::Result<Option<(Header, Vec<AxisCurve>)>> {
-    let Some(windows) = Windows::open(&args.log, args.window.as_deref(), options)? else { return Ok(None) };
+pub(super) fn axes(
+    request: &Request,
+    grid: TauGrid,
+    options: &LogOptions,
+) -> anyhow::Result<Option<(Header, Vec<AxisCurve>)>> {
+    let Some(windows) = Windows::open(&request.log, request.window.as_deref(), options)? else { return Ok(None) };
     let (samples, dt, axes, length) = (windows.samples, windows.dt, windows.axes(), windows.length());
     let header = Header {
         name: windows.name.clone(),
@@ -22,7 +26,7 @@ pub(super) fn axes(args: &Args, options: &LogOptions) -> anyhow::Result<Option<(
     let fitted = TauGrid::Log(allan_fit::POINTS_PER_DECADE);
     let pooled = |kind, grid| Pooled::new(kind, samples, dt, grid);
     let mut curves: Vec<[Pooled; 2]> =
-        axes.iter().map(|_| [pooled(args.deviation.kind(), args.taus), pooled(Deviation::Oadev, fitted)]).collect();
+        axes.iter().map(|_| [pooled(request.deviation.kind(), grid), pooled(Deviation::Oadev, fitted)]).collect();
     let left_out = windows.read(|axis, values| {
         let phase = match options.kind {
             InputKind::Rate => deviation::phase(values, dt),

@@ -1,0 +1,15 @@
+//! One file per command: what it is asked for, a `Request`, becomes a result with its document (floor 7).
+//!
+//! A request is described once: its fields are flags of the command line, and keys of a JSON object (unknown ones are
+//! refused). Nothing here prints: notes and progress go to who waits ([`crate::numerics::progress`]), files other than
+//! tables that are longer than memory are written by who asked. Errors are one line each, for a person.
+
+pub mod aid_columns;
+pub mod allan;
+pub mod amounts;
+pub mod checked;
+pub mod identify;
+pub mod plan;
+pub mod reading;
+pub mod stretch;
+pub mod windows;

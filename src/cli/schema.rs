@@ -2,7 +2,7 @@
 
 use clap::ValueEnum;
 
-use super::{Status, output, tune};
+use super::{Status, output};
 use crate::aircraft::airframe::AirplaneDocument;
 use crate::aircraft::airframe::check::AirplaneCheck;
 use crate::aircraft::control::document::LinearDocument;
@@ -14,7 +14,7 @@ use crate::filter::{AttitudeDesign, FilterDesign};
 use crate::identify::log_plan::LogPlan;
 use crate::input::inspect::Inventory;
 use crate::montecarlo;
-use crate::ops::{allan, identify};
+use crate::ops::{allan, identify, tune};
 use crate::params::Params;
 use crate::replay::ReplayResult;
 use crate::replay::attitude::AttitudeReplay;
@@ -94,8 +94,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         Document::Identify => printed::<identify::Document<'_>>(),
         Document::Plan => printed::<LogPlan>(),
         Document::Simulation => printed::<Summary>(),
-        Document::Tune => printed::<tune::Printed<'_>>(),
-        Document::TuneAttitude => printed::<tune::attitude::Printed<'_>>(),
+        Document::Tune => printed::<tune::Document<'_>>(),
+        Document::TuneAttitude => printed::<tune::attitude::Document<'_>>(),
         Document::Ranking => printed::<Ranking>(),
         Document::Replay => printed::<ReplayResult>(),
     })?;

@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use crate::ops::checked;
 use crate::params::{
@@ -12,32 +14,33 @@ use crate::params::{
 use crate::units::{Dimension, Quantity};
 
 /// The plant and what aids it.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, Default, clap::Args, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
 #[command(next_help_heading = "Plant")]
-pub(in crate::cli) struct PlantFlags {
+pub struct PlantFlags {
     /// What the sensor is part of: static, angle, rate, vertical, attitude, or a design FILE.json [default: the design of the parameters, else static]
     #[arg(long, value_name = "PLANT")]
-    pub(super) plant: Option<String>,
+    pub plant: Option<String>,
     /// A measurement of the plant: "[NAME:] SIGMA [@ RATE] [, SIGMA over TIME]", for example "heading: 2 deg @ 1 Hz, 1 deg over 60 s"; or
     /// its column in the logs, as in replay: heading=yaw:deg
     #[arg(long, value_name = "AID")]
-    pub(super) aid: Vec<String>,
+    pub aid: Vec<String>,
     /// Plant rate: "SIGMA over TIME" for a Gauss-Markov rate, or the density of an integrated random walk, such as "5 deg/s^2/sqrt(s)"
     #[arg(long, value_name = "MOTION")]
-    pub(super) motion: Option<String>,
+    pub motion: Option<String>,
     /// Plants vertical and attitude: noise parameters of the accelerometer, FILE or FILE:AXIS; of several axes attitude takes the noisiest
     #[arg(long, value_name = "PARAMS")]
-    pub(super) accelerometer: Option<String>,
+    pub accelerometer: Option<String>,
 }
 
 impl PlantFlags {
     /// The aids that are columns of logs: NAME=COLUMN.
-    pub(super) fn columns(&self) -> Vec<String> {
+    pub(crate) fn columns(&self) -> Vec<String> {
         self.aid.iter().filter(|text| text.contains('=')).cloned().collect()
     }
 
     /// `None`: no flag was given, the parameters decide.
-    pub(in crate::cli) fn design(&self, params: &Params) -> anyhow::Result<Option<Design>> {
+    pub(crate) fn design(&self, params: &Params) -> anyhow::Result<Option<Design>> {
         let aids: Vec<&String> = self.aid.iter().filter(|text| !text.contains('=')).collect();
         let nothing = self.plant.is_none() && aids.is_empty() && self.motion.is_none();
         if nothing && self.accelerometer.is_none() {
@@ -49,9 +52,9 @@ impl PlantFlags {
             design.aids.clear();
         }
         for text in aids {
-            let aid = aid(text, &design).with_context(|| format!("--aid \"{text}\""))?;
+            let aid = aid(text, &design).with_context(|| format!("`aid` \"{text}\""))?;
             if design.aids.iter().any(|earlier| earlier.name == aid.name) {
-                bail!("--aid \"{text}\": '{}' is the name of an earlier aid too; write \"NAME: …\"", aid.name);
+                bail!("`aid` \"{text}\": '{}' is the name of an earlier aid too; write \"NAME: …\"", aid.name);
             }
             design.aids.push(aid);
         }
@@ -67,7 +70,7 @@ impl PlantFlags {
                 let (path, sensor) = path
                     .split_once(".json#")
                     .map_or((path.to_string(), None), |(stem, sensor)| (format!("{stem}.json"), Some(sensor)));
-                let text = std::fs::read_to_string(&path).with_context(|| format!("--plant {path}: cannot read"))?;
+                let text = std::fs::read_to_string(&path).with_context(|| format!("`plant` {path}: cannot read"))?;
                 return Ok(Design::from_json(&text, &path, sensor)?);
             }
             Some("static") => PlantEntry::Static,
@@ -75,25 +78,25 @@ impl PlantFlags {
             Some("rate") => {
                 let text = self.motion.as_deref();
                 let text =
-                    text.context("--plant rate: say how the rate moves, for example --motion \"20 deg/s over 0.5 s\"")?;
+                    text.context("`plant` rate: say how the rate moves, for example `motion` \"20 deg/s over 0.5 s\"")?;
                 PlantEntry::Rate { motion: motion(text)?, initial_std_dev: None }
             }
             Some("vertical") => {
                 let path = self.accelerometer.as_deref();
-                let path = path.context("--plant vertical: give the accelerometer's noise, --accelerometer PARAMS")?;
+                let path = path.context("`plant` vertical: give the accelerometer's noise, `accelerometer` PARAMS")?;
                 let accelerometer = Box::new(accelerometer(path, Choice::Named)?);
                 PlantEntry::Vertical { accelerometer, gravity: None, initial_std_dev: None }
             }
             Some("attitude") => {
                 let path = self.accelerometer.as_deref();
-                let path = path.context("--plant attitude: give the accelerometer's noise, --accelerometer PARAMS")?;
+                let path = path.context("`plant` attitude: give the accelerometer's noise, `accelerometer` PARAMS")?;
                 let accelerometer = accelerometer(path, Choice::Noisiest)?;
                 PlantEntry::Attitude(Box::new(AttitudeEntry { accelerometer, gravity: None, scale_factor: None }))
             }
             Some("custom") => bail!(
-                "--plant custom: a custom plant needs its matrices; give them in a design file, --plant FILE.json"
+                "`plant` custom: a custom plant needs its matrices; give them in a design file, `plant` FILE.json"
             ),
-            Some(other) => bail!("--plant: {}", unknown_plant(other)),
+            Some(other) => bail!("`plant`: {}", unknown_plant(other)),
         };
         Ok(Design { plant, aids: Vec::new() })
     }
@@ -103,7 +106,7 @@ impl PlantFlags {
         let name = plant.name();
         match (&self.motion, &mut *plant) {
             (Some(text), PlantEntry::Rate { motion: known, .. }) => *known = motion(text)?,
-            (Some(_), _) => bail!("--motion is no matter of the plant '{name}'; it belongs to --plant rate"),
+            (Some(_), _) => bail!("`motion` is no matter of the plant '{name}'; it belongs to `plant` rate"),
             (None, _) => {}
         }
         match (&self.accelerometer, plant) {
@@ -112,7 +115,7 @@ impl PlantFlags {
             }
             (Some(path), PlantEntry::Attitude(entry)) => entry.accelerometer = accelerometer(path, Choice::Noisiest)?,
             (Some(_), _) => {
-                bail!("--accelerometer is no matter of the plant '{name}'; it belongs to --plant vertical and attitude")
+                bail!("`accelerometer` is no matter of the plant '{name}'; it belongs to `plant` vertical and attitude")
             }
             (None, _) => {}
         }
@@ -137,7 +140,7 @@ fn accelerometer(text: &str, choice: Choice) -> anyhow::Result<AxisParams> {
     };
     let params = checked::params(&PathBuf::from(path))?;
     if params.quantity != Quantity::SpecificForce {
-        bail!("--accelerometer {path}: is of an {}, expected a specific-force", params.quantity.name());
+        bail!("`accelerometer` {path}: is of an {}, expected a specific-force", params.quantity.name());
     }
     let names: Vec<&str> = params.axes.iter().map(|axis| axis.name.as_str()).collect();
     let white = |axis: &&AxisParams| axis.noise().white_density();
@@ -147,13 +150,13 @@ fn accelerometer(text: &str, choice: Choice) -> anyhow::Result<AxisParams> {
         (None, _) if choice == Choice::Noisiest => noisiest.map_or("", |axis| axis.name.as_str()),
         (None, [one]) => one,
         (None, [first, ..]) => bail!(
-            "--accelerometer {path}: there are the axes {}; choose one, for example --accelerometer {path}:{first}",
+            "`accelerometer` {path}: there are the axes {}; choose one, for example `accelerometer` {path}:{first}",
             names.join(", ")
         ),
-        (None, []) => bail!("--accelerometer {path}: there is no axis"),
+        (None, []) => bail!("`accelerometer` {path}: there is no axis"),
     };
     let found = params.axes.iter().find(|axis| axis.name == wanted);
-    found.cloned().ok_or_else(|| anyhow!("--accelerometer {path}: no axis '{wanted}'; there are {}", names.join(", ")))
+    found.cloned().ok_or_else(|| anyhow!("`accelerometer` {path}: no axis '{wanted}'; there are {}", names.join(", ")))
 }
 
 fn value(text: &str, dimension: Dimension) -> anyhow::Result<Measured> {
@@ -175,7 +178,7 @@ fn motion(text: &str) -> anyhow::Result<MotionEntry> {
     } else {
         value(text, rate.times_time(-3)).map(|density| MotionEntry::IntegratedRandomWalk { density })
     };
-    parsed.with_context(|| format!("--motion \"{text}\""))
+    parsed.with_context(|| format!("`motion` \"{text}\""))
 }
 
 /// `[NAME:] SIGMA [@ RATE] [, SIGMA over TIME]`.

@@ -15,20 +15,20 @@ use crate::replay::{LogShape, Options, ReplayResult, Replayer};
 use crate::tune::objective::Log;
 
 /// How logs are read, and the columns of the aids.
-pub(super) struct Logs<'a> {
-    pub(super) reading: &'a Reading,
-    pub(super) aids: &'a [String],
+pub(crate) struct Logs<'a> {
+    pub(crate) reading: &'a Reading,
+    pub(crate) aids: &'a [String],
 }
 
 /// A log opened for a design.
-pub(super) struct Opened {
-    pub(super) name: String,
-    pub(super) reader: LogReader,
-    pub(super) shape: LogShape,
+pub(crate) struct Opened {
+    pub(crate) name: String,
+    pub(crate) reader: LogReader,
+    pub(crate) shape: LogShape,
 }
 
 impl Logs<'_> {
-    pub(super) fn open(&self, path: &Path, design: &FilterDesign) -> anyhow::Result<Opened> {
+    pub(crate) fn open(&self, path: &Path, design: &FilterDesign) -> anyhow::Result<Opened> {
         let name = path.display().to_string();
         let extra = aid_columns(self.aids, design)?;
         let aids = extra.len();
@@ -49,7 +49,7 @@ impl Logs<'_> {
     }
 
     /// The whole log, its axes in the order of the design's, and its SHA-256.
-    pub(super) fn read(&self, path: &Path, design: &FilterDesign) -> anyhow::Result<(Log, String)> {
+    pub(crate) fn read(&self, path: &Path, design: &FilterDesign) -> anyhow::Result<(Log, String)> {
         let Opened { name, mut reader, shape } = self.open(path, design)?;
         let assigned = assign(design, &shape).with_context(|| name.clone())?;
         let beside = |model: &LinearModel| model.measurements.len() - usize::from(model.inputs.is_empty());
@@ -74,7 +74,7 @@ impl Logs<'_> {
     }
 
     /// The log through the design; only the verdict is wanted.
-    pub(super) fn replay(&self, path: &Path, design: &FilterDesign) -> anyhow::Result<ReplayResult> {
+    pub(crate) fn replay(&self, path: &Path, design: &FilterDesign) -> anyhow::Result<ReplayResult> {
         let Opened { name, mut reader, shape } = self.open(path, design)?;
         let mut replayer = Replayer::new(design, &shape, Options::default()).with_context(|| name.clone())?;
         let mut block = Block::default();

@@ -1,33 +1,39 @@
-//! What the parameters of a design are chosen by: flags.
-
-use std::path::PathBuf;
+//! What the parameters of a design are chosen by.
 
 use clap::ValueEnum;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use crate::tune::objective::Objective;
 
-#[derive(Debug, clap::Args)]
+/// What the physical parameters of a design are chosen by.
+#[derive(Clone, Debug, clap::Args, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
 #[command(next_help_heading = "Choosing the parameters")]
-pub(super) struct ObjectiveFlags {
+pub struct ObjectiveFlags {
     /// What the physical parameters are chosen by
     #[arg(long, value_enum, default_value_t = ObjectiveArg::Nominal)]
-    pub(super) objective: ObjectiveArg,
+    pub objective: ObjectiveArg,
     /// Parameters that stay as they are, such as gauss_markov.correlation_time, x.white or heading.std_dev
     #[arg(long, value_delimiter = ',', value_name = "NAME")]
-    pub(super) hold: Vec<String>,
+    pub hold: Vec<String>,
     /// Last share of each log that is not fitted to but foretold (likelihood, compare)
     #[arg(long, default_value_t = 1.0 / 3.0, value_name = "SHARE", allow_negative_numbers = true)]
-    pub(super) held_out: f64,
+    pub held_out: f64,
     /// Objective likelihood: the identified intervals do not count
     #[arg(long)]
-    pub(super) no_prior: bool,
-    /// Rank designs (filter.json, or params.json as identified) on logs instead
-    #[arg(long, num_args = 1.., value_name = "DESIGN|LOG")]
-    pub(super) compare: Vec<PathBuf>,
+    pub no_prior: bool,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub(super) enum ObjectiveArg {
+impl Default for ObjectiveFlags {
+    fn default() -> ObjectiveFlags {
+        ObjectiveFlags { objective: ObjectiveArg::Nominal, hold: vec![], held_out: 1.0 / 3.0, no_prior: false }
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum ObjectiveArg {
     /// The identified numbers
     #[default]
     Nominal,
@@ -42,7 +48,7 @@ pub(super) enum ObjectiveArg {
 }
 
 impl ObjectiveArg {
-    pub(super) fn objective(self) -> Objective {
+    pub(crate) fn objective(self) -> Objective {
         match self {
             ObjectiveArg::Nominal => Objective::Nominal,
             ObjectiveArg::Robust => Objective::Robust,
@@ -53,7 +59,7 @@ impl ObjectiveArg {
     }
 
     /// Whether it is found from logs.
-    pub(super) fn needs_logs(self) -> bool {
+    pub(crate) fn needs_logs(self) -> bool {
         matches!(self, ObjectiveArg::Likelihood | ObjectiveArg::Als)
     }
 }

@@ -13,6 +13,8 @@ pub mod identify;
 pub mod inflate;
 pub mod plan;
 pub mod reading;
+pub mod replay;
+pub mod simulate;
 pub mod stretch;
 pub mod tune;
 pub mod windows;

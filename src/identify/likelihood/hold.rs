@@ -65,7 +65,10 @@ impl Candidates {
         display: &Unit,
         logs: &[Vec<Stretch<'_>>],
     ) -> Result<Candidates, IdentifyError> {
-        let Some((free, refined)) = self.refined.take().filter(|_| !holds.is_empty()) else { return Ok(self) };
+        if holds.is_empty() {
+            return Ok(self);
+        }
+        let Some((free, refined)) = self.refined.take() else { return Ok(self) };
         let found = numbered(&free.fit, display);
         let mut held: Vec<(usize, f64, &Hold)> = Vec::new();
         for hold in holds {

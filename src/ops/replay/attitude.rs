@@ -1,10 +1,13 @@
 //! `replay` of an attitude filter.
 
-use anyhow::{Context, bail};
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use std::path::Path;
 
-use super::{Args, FormFlag, Status};
-use crate::cli::output::{print_json, print_report};
+use anyhow::{Context, anyhow, bail};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{Done, FormFlag, Request};
 use crate::export::table::TableWriter;
 use crate::filter::AttitudeDesign;
 use crate::filter::attitude::{Heading, Row};
@@ -18,29 +21,35 @@ use crate::replay::LogShape;
 use crate::replay::attitude::{AttitudeEstimate, AttitudeReplayer, LogRow, Reference};
 use crate::replay::axes::assign_to;
 use crate::units::{Dimension, Quantity, Unit};
-use crate::view;
 
 /// What only an attitude filter is asked.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
 #[command(next_help_heading = "Attitude")]
-pub(super) struct Flags {
+pub struct Flags {
     /// True orientation from the body to east, north, up: columns of w, x, y, z; a row without a number has none
     #[arg(long, value_delimiter = ',', value_name = "COLUMNS")]
-    reference: Option<Vec<String>>,
+    pub reference: Option<Vec<String>>,
     /// Noise of the reference about each axis, beside one sample of error in its time
     #[arg(long, default_value = "0.5 deg", value_name = "SIGMA", requires = "reference", allow_hyphen_values = true)]
-    reference_sigma: String,
+    pub reference_sigma: String,
     /// Column that is 1 where the body moves: errors count there, rests are elsewhere
     #[arg(long, value_name = "COLUMN")]
-    movement: Option<String>,
+    pub movement: Option<String>,
+}
+
+impl Default for Flags {
+    fn default() -> Flags {
+        Flags { reference: None, reference_sigma: "0.5 deg".into(), movement: None }
+    }
 }
 
 impl Flags {
     /// For filters that are not of the plant attitude.
     pub(super) fn refuse(&self) -> anyhow::Result<()> {
-        for (flag, given) in [("--reference", self.reference.is_some()), ("--movement", self.movement.is_some())] {
+        for (flag, given) in [("`reference`", self.reference.is_some()), ("`movement`", self.movement.is_some())] {
             if given {
-                bail!("{flag} belongs to a filter of the plant attitude (tune --plant attitude)");
+                bail!("{flag} belongs to a filter of the plant attitude (tune `plant` attitude)");
             }
         }
         Ok(())
@@ -60,29 +69,32 @@ enum HeadingColumns {
     Yaw(usize),
 }
 
-pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
+/// That only linear filters have.
+pub fn linear_only(option: &str, filter: &Path) -> anyhow::Error {
+    anyhow!("`{option}` is made for linear filters, {} is an attitude filter", filter.display())
+}
+
+pub(super) fn run(request: &Request) -> anyhow::Result<Done> {
     let given = [
-        ("--innovations", args.innovations),
-        ("--smooth", args.smooth),
-        ("--gate", args.gate.is_some()),
-        ("--robust", args.robust.is_some()),
-        ("--follow", args.follow.is_some()),
-        ("--form", args.form != FormFlag::Joseph),
-        ("--report", args.report.is_some()),
-        ("--plot", args.plot.is_some()),
+        ("innovations", request.innovations),
+        ("smooth", request.smooth),
+        ("gate", request.gate.is_some()),
+        ("robust", request.robust.is_some()),
+        ("follow", request.follow.is_some()),
+        ("form", request.form != FormFlag::Joseph),
     ];
-    if let Some((flag, _)) = given.iter().find(|(_, given)| *given) {
-        bail!("{flag} is made for linear filters, {} is an attitude filter", args.filter.display());
+    if let Some((option, _)) = given.iter().find(|(_, given)| *given) {
+        return Err(linear_only(option, &request.filter));
     }
-    let design = AttitudeDesign::read(&args.filter)?;
-    checked::say(&args.filter, checked::recorded(&design.tuning));
+    let design = AttitudeDesign::read(&request.filter)?;
+    checked::say(&request.filter, checked::recorded(&design.tuning));
     let std_dev =
-        Measured::positive(args.attitude.reference_sigma.trim(), Quantity::AngularRate.dimension().times_time(2));
-    let std_dev = std_dev.map_err(|message| anyhow::anyhow!("--reference-sigma: {message}"))?.si();
+        Measured::positive(request.attitude.reference_sigma.trim(), Quantity::AngularRate.dimension().times_time(2));
+    let std_dev = std_dev.map_err(|message| anyhow::anyhow!("`reference_sigma`: {message}"))?.si();
     let reference = Reference { std_dev, timing: design.model.dt };
-    let (extra, columns) = columns(args, &design).with_context(|| args.filter.display().to_string())?;
-    let mut reader = LogReader::open(&args.log, &LogOptions { extra, ..args.reading.rates()? })?;
-    let name = args.log.display().to_string();
+    let (extra, columns) = columns(request, &design).with_context(|| request.filter.display().to_string())?;
+    let mut reader = LogReader::open(&request.log, &LogOptions { extra, ..request.reading.rates()? })?;
+    let name = request.log.display().to_string();
     let mut check = reader.check().clone();
     check.expect_motion();
     note_check(&name, &check);
@@ -95,7 +107,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let wanted = design.axes.each_ref().map(String::as_str);
     let assigned =
         assign_to(&wanted, Quantity::AngularRate, design.sample_rate_hz, &shape).with_context(|| name.clone())?;
-    let mut writer = match &args.output {
+    let mut writer = match &request.output {
         Some(path) => Some(TableWriter::create(path, &header(&design))?),
         None => None,
     };
@@ -121,29 +133,24 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
             "{name}: no row has a number in all three columns of the accelerometer; without it an attitude cannot be found"
         );
     }
-    if args.attitude.reference.is_some() && result.errors.is_none() {
-        bail!("{name}: no row has a reference that counts (a unit quaternion, and movement where --movement is given)");
+    if request.attitude.reference.is_some() && result.errors.is_none() {
+        bail!("{name}: no row has a reference that counts (a unit quaternion, and movement where `movement` is given)");
     }
     if let Some(writer) = writer {
         writer.finish()?;
     }
     result.log = Some(name);
     result.log_sha256 = Some(reader.sha256().to_string());
-    if args.json {
-        print_json(&result)?;
-    } else {
-        print_report(&view::replay::attitude(&result, &design));
-    }
-    Ok(args.judging.status([result.verdict]))
+    Ok(Done::Attitude(Box::new(result), Box::new(design)))
 }
 
 /// The extra columns of the log and what each is.
-fn columns(args: &Args, design: &AttitudeDesign) -> anyhow::Result<(Vec<ExtraColumn>, Columns)> {
+fn columns(request: &Request, design: &AttitudeDesign) -> anyhow::Result<(Vec<ExtraColumn>, Columns)> {
     let mut extra = Vec::new();
     let heading_name = design.model.heading.as_ref().map(|heading| heading.name.as_str());
     let (mut force, mut heading) = (None, None);
-    for flag in &args.aid {
-        let (name, list) = flag.split_once('=').with_context(|| format!("--aid {flag}: expected NAME=COLUMNS"))?;
+    for flag in &request.aid {
+        let (name, list) = flag.split_once('=').with_context(|| format!("`aid` {flag}: expected NAME=COLUMNS"))?;
         let list: Vec<&str> = list.split(',').map(str::trim).collect();
         let first = extra.len();
         let three = [first, first + 1, first + 2];
@@ -166,34 +173,34 @@ fn columns(args: &Args, design: &AttitudeDesign) -> anyhow::Result<(Vec<ExtraCol
                 } else {
                     "three columns x, y, z of a field, or one of the yaw angle"
                 };
-                bail!("--aid {flag}: {found} columns, or given twice; expected {columns}, once");
+                bail!("`aid` {flag}: {found} columns, or given twice; expected {columns}, once");
             }
             (name, _) => {
                 let known = heading_name.map_or(String::new(), |name| format!(" and {name}"));
-                bail!("--aid {flag}: the filter has no measurement '{name}'; it has accelerometer{known}");
+                bail!("`aid` {flag}: the filter has no measurement '{name}'; it has accelerometer{known}");
             }
         };
-        extra.extend(list.iter().map(|text| column(text, dimensions, &format!("--aid {}", name.trim()))));
+        extra.extend(list.iter().map(|text| column(text, dimensions, &format!("`aid` {}", name.trim()))));
     }
     let force = force.context(
-        "an attitude filter needs the accelerometer; say which columns it has: --aid accelerometer=AX,AY,AZ",
+        "an attitude filter needs the accelerometer; say which columns it has: `aid` accelerometer=AX,AY,AZ",
     )?;
     if let (Some(name), None) = (heading_name, &heading) {
         bail!(
-            "the filter measures {name}; say which columns that is: --aid {name}=MX,MY,MZ for a field, or --aid {name}=YAW"
+            "the filter measures {name}; say which columns that is: `aid` {name}=MX,MY,MZ for a field, or `aid` {name}=YAW"
         );
     }
-    let reference = match args.attitude.reference.as_deref() {
+    let reference = match request.attitude.reference.as_deref() {
         Some([w, x, y, z]) => {
             let first = extra.len();
-            extra.extend([w, x, y, z].iter().map(|text| column(text, None, "--reference")));
+            extra.extend([w, x, y, z].iter().map(|text| column(text, None, "`reference`")));
             Some([first, first + 1, first + 2, first + 3])
         }
-        Some(other) => bail!("--reference: {} columns; expected four, w, x, y, z of the quaternion", other.len()),
+        Some(other) => bail!("`reference`: {} columns; expected four, w, x, y, z of the quaternion", other.len()),
         None => None,
     };
-    let movement = args.attitude.movement.as_deref().map(|text| {
-        extra.push(column(text, None, "--movement"));
+    let movement = request.attitude.movement.as_deref().map(|text| {
+        extra.push(column(text, None, "`movement`"));
         extra.len() - 1
     });
     Ok((extra, Columns { force, heading, reference, movement }))

@@ -100,8 +100,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         Ok(Log { path, writer, lines: (run == 0 && args.plot.is_some()).then_some(&lines) })
     };
     let flown = fly(&plan, args.seed, args.runs, open)?;
-    let lines = lines.into_inner().unwrap_or_default();
-    let report = view::fly::fly(&flown, &header, &lines, &plan.stops());
+    let lines = lines.into_inner().ok().filter(|_| args.plot.is_some());
+    let report = view::fly::fly(&flown, &header, lines.as_ref(), &plan.stops());
     files::write_plot(args.plot.as_deref(), &format!("Flight of {}", flown.airplane), &report)?;
     if args.json {
         print_json(&flown)?;

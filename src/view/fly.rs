@@ -17,8 +17,8 @@ const ANGLES: [(&str, &str); 8] = [
     ("rudder (rad)", "deg"),
 ];
 
-/// `header` and `lines`: columns of the log and their course, empty where no figure is wanted; `stops` in rad.
-pub fn fly<'a>(flown: &FlightReport, header: &'a [String], lines: &'a Envelope, stops: &[f64]) -> Report<'a> {
+/// `header` and `lines`: columns of the log and their course, where figures are wanted; `stops` in rad.
+pub fn fly<'a>(flown: &FlightReport, header: &[String], lines: Option<&Envelope>, stops: &[f64]) -> Report<'a> {
     let mut section = Section::new("");
     if let Some(first) = flown.runs.first() {
         let rows = ANGLES.iter().filter_map(|(name, unit)| {
@@ -45,12 +45,11 @@ pub fn fly<'a>(flown: &FlightReport, header: &'a [String], lines: &'a Envelope, 
                 flown.duration_s, flown.airplane, first.rows, flown.every_s, flown.step_s, flown.seed
             ));
     }
-    section =
-        figures(header, lines, stops).into_iter().fold(section, |section, svg| section.figure("", move || svg.clone()));
+    let drawn = lines.map_or_else(Vec::new, |lines| figures(header, lines, stops));
+    section = drawn.into_iter().fold(section, |section, svg| section.figure("", move || svg.clone()));
     Report { title: format!("Flight of {}", flown.airplane), sections: vec![section], ..Report::default() }
 }
 
-/// Nothing without lines.
 fn figures(header: &[String], lines: &Envelope, stops: &[f64]) -> Vec<String> {
     let line = |name: &str| -> Option<Vec<(f64, f64)>> {
         let number = header.iter().position(|column| column.split(' ').next() == Some(name))?;

@@ -143,7 +143,8 @@ fn candidates<'a>(section: Section<'a>, candidates: &[Candidate]) -> Section<'a>
             (caption, ["chi-square", "dof"])
         }
         None => (
-            "Candidates (ln L of the log, and of its last third under what the first two thirds give, against the chosen; \
+            "Candidates (ln L of the log, and of its last third under what the first two thirds give, against the \
+             chosen; \
              score: -2 ln L plus a cost for every process, lowest wins, unless one within 6 of it foretells that third \
              better by more than 3)",
             ["ln L", "held out"],

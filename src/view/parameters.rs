@@ -25,7 +25,8 @@ pub(super) fn table<'a>(section: Section<'a>, found: &Identified, quantity: Quan
     let terms = terms.into_iter().map(|row| with_bound(row, precision.next()));
     section
         .table(
-            "Parameters with 95 % intervals, and their standard deviation beside the Cramér-Rao bound of a log like this",
+            "Parameters with 95 % intervals, and their standard deviation beside the Cramér-Rao bound of a log like \
+             this",
             &["parameter", "value", "95 % from", "to", "unit", "sd (%)", "bound (%)", "ratio", "also"],
             bias.map(|row| with_bound(row, None)).chain(terms),
         )

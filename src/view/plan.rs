@@ -15,10 +15,10 @@ pub fn plan<'a>(plan: &LogPlan) -> Report<'a> {
     }
     sections.push(Section::new("").paragraphs(
         [
-            "Precision: relative standard deviation (1 sigma) of a maximum likelihood estimate, Cramér-Rao bound at these \
-             parameters.",
-            "Assumed: a sensor at rest, the model of the parameters; the same coefficients at a higher rate (white noise of \
-             the same density);",
+            "Precision: relative standard deviation (1 sigma) of a maximum likelihood estimate, Cramér-Rao bound at \
+             these parameters.",
+            "Assumed: a sensor at rest, the model of the parameters; the same coefficients at a higher rate (white \
+             noise of the same density);",
             "a lower rate either as means of consecutive samples or with samples thrown away.",
         ]
         .map(String::from)

@@ -37,8 +37,8 @@ pub fn trim<'a>(linearized: &'a Linearized, document: &'a LinearDocument) -> Rep
                 .table("", &["mode", "eigenvalue (1/s)", "frequency (rad/s)", "damping", "time (s)"], modes)
                 .paragraph(format!("n/alpha {} 1/rad{cap}", digits(document.load_per_angle)))
                 .figure(
-                    "Eigenvalues of the longitudinal and the lateral model. Thin lines: least damping of Level 1 of the short \
-                     period (0.35) and of the Dutch roll (0.19) of MIL-F-8785C, categories A and C, A.",
+                    "Eigenvalues of the longitudinal and the lateral model. Thin lines: least damping of Level 1 of \
+                     the short period (0.35) and of the Dutch roll (0.19) of MIL-F-8785C, categories A and C, A.",
                     || poles(document),
                 ),
             Section::of_page("Handling-quality levels")

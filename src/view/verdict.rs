@@ -7,7 +7,7 @@ use crate::units::digits;
 const TESTS: [&str; 10] =
     ["axis", "test", "statistic", "lower", "upper", "p", "effect", "interval", "tolerated", "result"];
 
-/// What "small" means, with `more` to it; then the tests of `of` ("the innovations"), and what the significant ones say.
+/// The tests of `of` ("the innovations") and what the significant ones say; `more`: a sentence to what "small" means.
 pub(super) fn tests<'a>(of: &str, more: &str, tests: &[Test], alpha: f64) -> Section<'a> {
     let caption = format!(
         "Tests of {of}: bounds at {} %, each alone; p adjusted for all {} tests (Holm)",

@@ -257,8 +257,8 @@ fn of_innovations<'a>(section: Section<'a>, innovations: &'a Innovations, title:
     if periodogram.share.is_empty() {
         return section;
     }
-    let caption = "Power of the block-averaged innovations up to each frequency: above the band there is more slow power than \
-                   the filter says, below it less.";
+    let caption = "Power of the block-averaged innovations up to each frequency: above the band there is more slow \
+                   power than the filter says, below it less.";
     section.figure(caption, move || {
         figure::cumulative_periodogram(&figure::Periodogram {
             title: power.clone(),

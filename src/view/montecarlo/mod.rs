@@ -183,8 +183,8 @@ pub(super) const TESTS: [&str; 9] =
 
 pub(super) fn tests_caption(outcome: &Outcome) -> String {
     format!(
-        "Tests: a true filter keeps within all bounds with {} %; a test is beyond its bounds when its p is at most {}, its \
-         family-wise p at most {}",
+        "Tests: a true filter keeps within all bounds with {} %; a test is beyond its bounds when its p is at most \
+         {}, its family-wise p at most {}",
         digits(100.0 * (1.0 - outcome.alpha)),
         digits(outcome.critical_p_value),
         outcome.alpha
@@ -205,7 +205,7 @@ fn tests<'a>(outcome: &Outcome) -> Section<'a> {
         .list(failed.map(|t| format!("{}, {}: {}.", t.axis, t.name, t.meaning)).collect())
         .at(Level::Full)
         .table(tests_caption(outcome), &TESTS, outcome.tests.iter().map(test_row))
-        .minor(&["lower", "upper", "p"])
+        .minor(&["statistic", "lower", "upper", "p"])
 }
 
 /// NEES over time with the band of the gate; `expected` under the truth where that is another.

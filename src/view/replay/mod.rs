@@ -141,7 +141,8 @@ fn figures<'a>(result: &'a ReplayResult, axis: &'a AxisResult, unit: Option<&'a 
         });
     if count > 1 {
         let caption = format!(
-            "Means of {count} innovations times the root of {count}: wrong slow drift shows here, as too wide or too narrow."
+            "Means of {count} innovations times the root of {count}: wrong slow drift shows here, as too wide or too \
+             narrow."
         );
         section = section.figure(caption, move || innovations("averaged innovations", true));
     }
@@ -155,7 +156,8 @@ fn figures<'a>(result: &'a ReplayResult, axis: &'a AxisResult, unit: Option<&'a 
         })
     });
     if !curves.cumulative_periodogram.is_empty() {
-        let caption = "Power of the block-averaged innovations up to each frequency: a straight line when the drift model is right.";
+        let caption = "Power of the block-averaged innovations up to each frequency: a straight line when the drift \
+                       model is right.";
         section = section.figure(caption, move || {
             figure::cumulative_periodogram(&figure::Periodogram {
                 title: titled("cumulative periodogram"),

@@ -35,15 +35,15 @@ pub(super) fn section<'a>(group: &Group<'a>, insight: &'a Insight) -> Section<'a
     let duration = duration(single.steps as f64 * group.design.model.dt);
     section
         .table(
-            "What wrong parameters cost: real sigma over claimed sigma and mean NIS in steady state, the filter as designed, \
-             the truth with",
+            "What wrong parameters cost: real sigma over claimed sigma and mean NIS in steady state, the filter as \
+             designed, the truth with",
             &mistake_header(insight),
             mistake_rows(insight),
         )
         .table(
             format!(
-                "In single precision: error and claimed sigma over those in double, worst state, {duration} of the design's own \
-                 model; the correlation matrix of P has condition {}",
+                "In single precision: error and claimed sigma over those in double, worst state, {duration} of the \
+                 design's own model; the correlation matrix of P has condition {}",
                 digits(single.condition)
             ),
             &["update in f32", "largest error", "of", "claimed sigma", "of"],

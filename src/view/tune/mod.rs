@@ -237,6 +237,7 @@ fn verification<'a>(of: &Design<'a>) -> Section<'a> {
             &["axis", "NEES at first", "NEES over time", "NEES at last", "NIS", "least adjusted p", "result"],
             outcome.axes.iter().map(row),
         )
+        .minor(&["NEES at first", "NEES at last"])
         .at(Level::Page)
         .table(montecarlo::tests_caption(outcome), &montecarlo::TESTS, outcome.tests.iter().map(montecarlo::test_row))
 }

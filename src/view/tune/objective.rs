@@ -57,15 +57,15 @@ fn robust<'a>(section: Section<'a>, axis: &RobustAxis, params: &Params) -> Secti
     });
     let law = if axis.correlated { "with the correlation of likelihood estimates" } else { "independently" };
     let caption = format!(
-        "Axis {}: on {} other sensors, drawn from the intervals {law}: claimed steady sigma, and the mean over the sensors \
-         of the true one",
+        "Axis {}: on {} other sensors, drawn from the intervals {law}: claimed steady sigma, and the mean over the \
+         sensors of the true one",
         axis.axis, axis.sensors
     );
     let [nominal, robust, most] = [axis.too_small_nominal, axis.too_small, 1.0 - axis.criterion].map(|s| 100.0 * s);
     let met = if axis.met { "met" } else { "MISSED" };
     let sentence = format!(
-        "claimed sigma too small for {nominal:.1} % of the sensors as identified, {robust:.1} % robust; criterion, at most \
-         {most:.1} %: {met}"
+        "claimed sigma too small for {nominal:.1} % of the sensors as identified, {robust:.1} % robust; criterion, \
+         at most {most:.1} %: {met}"
     );
     section.table(caption, &ROBUST, rows).list(vec![sentence])
 }

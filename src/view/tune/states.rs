@@ -17,8 +17,10 @@ pub(super) fn tables<'a>(section: Section<'a>, group: &Group<'_>) -> Section<'a>
     let header = ["state", "unit", "sigma of P0", "sigma of Q per step", "steady sigma"].map(str::to_owned);
     let header: Vec<String> = header.into_iter().chain(gains).collect();
     let facts = facts(group).into_iter().map(|(label, value)| [label.to_string(), value]);
-    let mut section =
-        section.table("States", &header, state_rows(group)).table("Measurement and loop", &["", ""], facts);
+    let mut section = section
+        .table("States", &header, state_rows(group))
+        .minor(&["sigma of P0", "sigma of Q per step"])
+        .table("Measurement and loop", &["", ""], facts);
     for budget in &group.report.plant_budgets {
         let (scale, unit) = group.shown(&budget.unit);
         let caption = format!("Error budget of the {} in steady state (sigma in {unit})", budget.state);

@@ -71,13 +71,14 @@ impl Trim {
 
 impl Inertia {
     /// ω̇ of J ω̇ = M − ω×(Jω) with J = [xx 0 −xz; 0 yy 0; −xz 0 zz].
+    #[inline(always)]
     pub fn acceleration(&self, moment: [f64; 3], [p, q, r]: [f64; 3]) -> [f64; 3] {
         let [hx, hy, hz] = [self.xx * p - self.xz * r, self.yy * q, self.zz * r - self.xz * p];
         let l = moment[0] - (q * hz - r * hy);
         let m = moment[1] - (r * hx - p * hz);
         let n = moment[2] - (p * hy - q * hx);
-        let determinant = self.xx * self.zz - self.xz * self.xz;
-        [(self.zz * l + self.xz * n) / determinant, m / self.yy, (self.xz * l + self.xx * n) / determinant]
+        let per_determinant = 1.0 / (self.xx * self.zz - self.xz * self.xz);
+        [(self.zz * l + self.xz * n) * per_determinant, m / self.yy, (self.xz * l + self.xx * n) * per_determinant]
     }
 }
 

@@ -87,12 +87,14 @@ pub struct Airplane {
 
 impl Airplane {
     /// What it feels in air of a density (kg/m³).
+    #[inline(always)]
     pub fn forces(&self, air: &AirState, controls: &Controls, density: f64) -> Wrench {
-        let mut wrench = self.aerodynamics.forces(&self.size, air, controls, density);
         let [u, v, w] = air.velocity;
-        let running = self.propulsion.running(controls.throttle, (u * u + v * v + w * w).sqrt(), density);
-        wrench.force[0] += running.thrust;
-        wrench.moment[0] -= running.reaction;
+        let speed = (u * u + v * v + w * w).sqrt();
+        let mut wrench = self.aerodynamics.forces(&self.size, air, speed, controls, density);
+        let (thrust, reaction) = self.propulsion.thrust_and_reaction(controls.throttle, speed, density);
+        wrench.force[0] += thrust;
+        wrench.moment[0] -= reaction;
         wrench
     }
 

@@ -15,11 +15,13 @@ pub struct Gust {
 
 impl Gust {
     /// The way from this one to another, 0 to 1.
+    #[inline(always)]
     pub fn towards(&self, other: &Gust, part: f64) -> Gust {
         let mix = |a: &[f64; 3], b: &[f64; 3]| std::array::from_fn(|i| a[i] + part * (b[i] - a[i]));
         Gust { velocity: mix(&self.velocity, &other.velocity), rate: mix(&self.rate, &other.rate) }
     }
 
+    #[inline(always)]
     pub fn plus(&self, other: &Gust) -> Gust {
         let sum = |a: &[f64; 3], b: &[f64; 3]| std::array::from_fn(|i| a[i] + b[i]);
         Gust { velocity: sum(&self.velocity, &other.velocity), rate: sum(&self.rate, &other.rate) }

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, SMatrix, SVector};
 use rand::rngs::ChaCha8Rng;
 
 use super::Gust;
-use super::dryden::{GustModel, PARTS, STATES};
+use super::dryden::{GustModel, OUTPUTS, PARTS, STATES};
 use crate::numerics::linalg::{LinalgError, cholesky_semidefinite};
 use crate::numerics::random::normal;
 
@@ -32,7 +32,12 @@ impl Turbulence {
 
     /// The gust at the present step.
     pub fn gust(&self) -> Gust {
-        let y = self.c * self.x;
+        let mut y = [0.0; 6];
+        for ((at, n), outputs) in PARTS.into_iter().zip(OUTPUTS) {
+            for output in outputs {
+                y[*output] = (at..at + n).map(|i| self.c[(*output, i)] * self.x[i]).sum();
+            }
+        }
         Gust { velocity: [y[0], y[1], y[2]], rate: [y[3], y[4], y[5]] }
     }
 

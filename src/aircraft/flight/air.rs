@@ -75,6 +75,7 @@ impl MovingAir {
     }
 
     /// At a part of the present step, 0 to 1, and a way through the air.
+    #[inline(always)]
     pub(super) fn gust(&self, part: f64, way: f64) -> Gust {
         let turbulence = if self.turbulence.is_empty() { Gust::default() } else { self.now.towards(&self.next, part) };
         let begun = self.discrete.iter().zip(&self.begins).filter_map(|(gust, begin)| Some((gust, (*begin)?)));

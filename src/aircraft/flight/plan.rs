@@ -307,7 +307,7 @@ pub(super) fn state(earth: Earth, place: Geodetic, euler: Vector, velocity: Vect
     };
     let attitude = earth.attitude(r, &super::vector::from_euler(euler));
     let c = matrix(attitude);
-    let inertial = super::vector::plus(rate, back(&c, earth.field(r).rate));
+    let inertial = super::vector::plus(rate, earth.field(r, &c).rate);
     let [a, b, d] = [r, velocity, inertial];
     let e = attitude;
     [a[0], a[1], a[2], b[0], b[1], b[2], e[0], e[1], e[2], e[3], d[0], d[1], d[2], 0.0]

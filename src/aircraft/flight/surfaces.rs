@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::servo::{Servo, ServoState, Transition};
+use super::servo::{Motion, Servo, ServoState};
 use crate::aircraft::airframe::Controls;
 
 /// Elevator, aileron, rudder, throttle or thrust.
@@ -20,7 +20,7 @@ pub(super) struct Surface {
     command: f64,
     state: ServoState,
     /// Of the last step.
-    motion: Option<Transition>,
+    motion: Option<Motion>,
     /// When which command arrives.
     pending: VecDeque<(f64, f64)>,
 }

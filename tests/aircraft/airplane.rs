@@ -48,6 +48,20 @@ fn level_flight_ends_where_the_sheet_says() {
     assert!(text.contains("ended by elevator") && text.contains("ended by thrust"), "{text}");
 }
 
+/// Measured inertias may miss the triangle by a little: read with a warning; by more than a percent they are refused.
+#[test]
+fn published_inertias_that_miss_the_triangle_are_warned_of() {
+    let text = Bench::new().ok(&format!("airplane {}", data("airplanes/ultrastick-25e.json").display()));
+    assert!(text.contains("largest principal moment is 0.3 % above the sum"), "{text}");
+    let text = Bench::new().ok(&format!("airplane {}", data("airplanes/aerosonde.json").display()));
+    assert!(!text.contains("principal moment is"), "{text}");
+    let bench = Bench::new();
+    let mut more = document("ultrastick-25e");
+    more["inertia"]["zz"] = json!("0.156 kg m^2");
+    bench.file("airplane.json", more.to_string());
+    refused(&bench, &["airplane", "airplane.json"], &["airplane.json: inertia", "belong to no body"]);
+}
+
 #[test]
 fn trim_writes_one_document_and_a_page() {
     let bench = bench();
@@ -76,6 +90,12 @@ fn flight_that_is_not_possible_is_refused_by_what_is_missing() {
     refused(&bench, &trim("25 m", &[]), &["--speed 25 m", "a velocity"]);
     refused(&bench, &trim("25 m/s", &["--bank", "10 deg", "--lateral", "wings_level"]), &["two angles of bank"]);
     refused(&bench, &["trim", "airplane.json", "--speed", "25 m/s"], &["--altitude"]);
+    // 25 m/s needs 3.1 deg
+    let mut early = document("aerosonde");
+    early["aerodynamics"]["stall"]["angle"] = json!("2 deg");
+    bench.file("airplane.json", early.to_string());
+    refused(&bench, &trim("25 m/s", &[]), &["no lift", "stall"]);
+    bench.file("airplane.json", document("aerosonde").to_string());
     refused(&bench, &["trim", "airplane.json", "--speed", "25 m/s", "--altitude", "30 km"], &["standard atmosphere"]);
 }
 

@@ -1,12 +1,14 @@
-//! The nonlinear flight in its linear limit: responses by e^(At), covariances by Lyapunov's equation, both of a second implementation.
+//! The nonlinear flight in its linear limit: responses by e^(At), covariances by Lyapunov's equation, both of a second
+//! implementation.
 
 use rayon::prelude::*;
 use serde_json::json;
 
 use super::flights::{Table, aerosonde, level, one, runs, times, trim};
 
-/// The sheet's deviations after a step of one degree in the elevator, u w q θ by e^(At), and in the aileron, v p r φ; here the mean of a hundredth of it up and
-/// down. The height, which the linear model leaves out, is felt by 1e-3 after a second.
+/// The sheet's deviations after a step of one degree in the elevator, u w q θ by e^(At), and in the aileron, v p r φ;
+/// here the mean of a hundredth of it up and down. The height, which the linear model leaves out, is felt by 1e-3 after
+/// a second.
 #[test]
 fn small_steps_from_trim_follow_the_linear_model() {
     let c = trim().controls;
@@ -60,7 +62,8 @@ fn small_steps_from_trim_follow_the_linear_model() {
     }
 }
 
-/// The sheet's response to an up-gust of 1 − cos form, 3 m/s over 25 m, of which a thousandth is flown. w is that of the airplane, not of the air.
+/// The sheet's response to an up-gust of 1 − cos form, 3 m/s over 25 m, of which a thousandth is flown. w is that of
+/// the airplane, not of the air.
 #[test]
 fn a_small_discrete_gust_follows_the_linear_model() {
     let mut document = level();
@@ -82,9 +85,10 @@ fn a_small_discrete_gust_follows_the_linear_model() {
     assert!((gust.at(0.25, &["gust_w"])[0] + 1.5e-3).abs() < 1e-6);
 }
 
-/// A hundredth of light turbulence on the airframe without servos; roll and yaw held by the sheet's gains. Mean squares of 48 flights against the sheet's
-/// covariances by Lyapunov's equation, 8 states within 4.5 standard errors: a false alarm in 1 of 18,000 such tests. A wrong sign of the pitch gust, a π too
-/// many in the roll gust, lengths of the other document or a gust held for 0.1 s move at least one of them further.
+/// A hundredth of light turbulence on the airframe without servos; roll and yaw held by the sheet's gains. Mean squares
+/// of 48 flights against the sheet's covariances by Lyapunov's equation, 8 states within 4.5 standard errors: a false
+/// alarm in 1 of 18,000 such tests. A wrong sign of the pitch gust, a π too many in the roll gust, lengths of the other
+/// document or a gust held for 0.1 s move at least one of them further.
 #[test]
 fn the_covariance_in_gusts_is_that_of_lyapunovs_equation() {
     const RUNS: u64 = 48;
@@ -127,8 +131,8 @@ fn the_covariance_in_gusts_is_that_of_lyapunovs_equation() {
     moves_at_every_step(&document);
 }
 
-/// The gust is another one at each step of the integration: mean square of its increments over 2.5 ms against the exact law, within 5 standard errors of 4000
-/// increments that are almost independent.
+/// The gust is another one at each step of the integration: mean square of its increments over 2.5 ms against the exact
+/// law, within 5 standard errors of 4000 increments that are almost independent.
 fn moves_at_every_step(document: &serde_json::Value) {
     use kfdesign::aircraft::atmosphere::dryden::{Dryden, Intensity, Specification};
     let table: Table = one(document, times(10.0, None, None));

@@ -160,7 +160,8 @@ fn the_discrete_form_is_exact() {
     close(&[q[(6, 6)]], &[8.236_398_664e-6], 1e-9);
 }
 
-/// Two steps are one of twice the length, and the stationary covariance stays: also for steps so short that entries of Q differ by 1e-12.
+/// Two steps are one of twice the length, and the stationary covariance stays: also for steps so short that entries of
+/// Q differ by 1e-12.
 #[test]
 fn steps_compose_however_short_they_are() {
     let model = reference().model();
@@ -212,8 +213,8 @@ fn vector(t: &Turbulence) -> SVector<f64, 6> {
     SVector::from([g.velocity[0], g.velocity[1], g.velocity[2], g.rate[0], g.rate[1], g.rate[2]])
 }
 
-/// Covariances of 8000 independent paths at their first sample, at the 40th, and between both. 108 means of products, each within 5 standard errors: a
-/// false alarm in 1 of 16,000 such tests.
+/// Covariances of 8000 independent paths at their first sample, at the 40th, and between both. 108 means of products,
+/// each within 5 standard errors: a false alarm in 1 of 16,000 such tests.
 #[test]
 fn simulated_covariances_are_the_exact_ones() {
     const RUNS: u64 = 8000;
@@ -247,8 +248,8 @@ fn simulated_covariances_are_the_exact_ones() {
     check("lag", &lagged, &|run, i, j| pairs[run].1[i] * pairs[run].0[j]);
 }
 
-/// Mean periodograms of 400 paths of 10 s against their exact expectation, which the exact autocovariance gives: 6 gusts at 4 frequencies, 1e-5 each, a false
-/// alarm in 1 of 4,000 such tests.
+/// Mean periodograms of 400 paths of 10 s against their exact expectation, which the exact autocovariance gives: 6
+/// gusts at 4 frequencies, 1e-5 each, a false alarm in 1 of 4,000 such tests.
 #[test]
 fn simulated_spectra_are_the_exact_ones() {
     const RUNS: u64 = 400;

@@ -1,8 +1,9 @@
 //! Small motions about a steady flight: ẋ = A x + B u + E g.
 //!
-//! With V the velocity and ω the rate in body axes, V̇ = F/m + g_b − ω×V, J ω̇ = M − ω×(Jω), φ̇ = p + tan θ (q sin φ + r cos φ), θ̇ = q cos φ − r sin φ
-//! (Stevens, Lewis and Johnson 2016, section 1.7); F and M belong to the motion relative to the air, so that a gust enters as its negative there and nowhere
-//! else: E holds the negative columns of A without gravity and without the ω×V part. The density stays that of the trim.
+//! With V the velocity and ω the rate in body axes, V̇ = F/m + g_b − ω×V, J ω̇ = M − ω×(Jω), φ̇ = p + tan θ (q sin φ +
+//! r cos φ), θ̇ = q cos φ − r sin φ (Stevens, Lewis and Johnson 2016, section 1.7); F and M belong to the motion
+//! relative to the air, so that a gust enters as its negative there and nowhere else: E holds the negative columns of A
+//! without gravity and without the ω×V part. The density stays that of the trim.
 
 use nalgebra::DMatrix;
 
@@ -114,8 +115,9 @@ impl Airplane {
         ]
     }
 
-    /// A, B and E at a trim by central differences with three steps, extrapolated to step zero twice (Richardson): the error is of order six in the step,
-    /// below 1e-9 of the largest entry of a row for derivatives that change over more than a tenth of the angles.
+    /// A, B and E at a trim by central differences with three steps, extrapolated to step zero twice (Richardson): the
+    /// error is of order six in the step, below 1e-9 of the largest entry of a row for derivatives that change over
+    /// more than a tenth of the angles.
     pub fn linear(&self, trim: &Trim) -> LinearModels {
         let ([u, v, w], [p, q, r]) = (trim.velocity, trim.rate);
         let c = trim.controls;

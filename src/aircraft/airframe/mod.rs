@@ -1,7 +1,7 @@
 //! The `airplane.json` document, aerodynamics, propulsion and trim (floor 2).
 //!
-//! [`Airplane`] is an airplane in SI; what it feels in moving air is [`Airplane::forces`], a pure function of the state of the air, the controls and the
-//! density.
+//! [`Airplane`] is an airplane in SI; what it feels in moving air is [`Airplane::forces`], a pure function of the state
+//! of the air, the controls and the density.
 
 mod aerodynamics;
 pub mod check;
@@ -10,11 +10,12 @@ pub mod levels;
 pub mod linear;
 pub mod modes;
 mod propulsion;
+mod schema;
 pub mod trim;
 
 pub use aerodynamics::{Aerodynamics, Drag, Lateral, Lift, Pitch, Stall};
-pub use document::AirplaneDocument;
 pub use propulsion::{Curve, Motor, Propulsion, Running};
+pub use schema::AirplaneDocument;
 
 /// Velocity (m/s) and rate (rad/s) against the air, body axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -23,7 +24,8 @@ pub struct AirState {
     pub rate: [f64; 3],
 }
 
-/// Where surfaces (rad) and throttle stand. An airplane whose propulsion is a thrust has it, in N, in place of the throttle.
+/// Where surfaces (rad) and throttle stand. An airplane whose propulsion is a thrust has it, in N, in place of the
+/// throttle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Controls {
     pub elevator: f64,
@@ -39,13 +41,24 @@ pub struct Wrench {
     pub moment: [f64; 3],
 }
 
-/// Moments of inertia about the centre of gravity, kg m². `xz` is the integral ∫xz dm, so that the matrix is [xx 0 −xz; 0 yy 0; −xz 0 zz].
+/// Moments of inertia about the centre of gravity, kg m². `xz` is the integral ∫xz dm, so that the matrix is [xx 0 −xz;
+/// 0 yy 0; −xz 0 zz].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Inertia {
     pub xx: f64,
     pub yy: f64,
     pub zz: f64,
     pub xz: f64,
+}
+
+impl Inertia {
+    /// Ascending; the y axis is one of theirs.
+    pub fn principal_moments(&self) -> [f64; 3] {
+        let (mean, half) = (0.5 * (self.xx + self.zz), (0.5 * (self.xx - self.zz)).hypot(self.xz));
+        let mut moments = [mean - half, self.yy, mean + half];
+        moments.sort_by(f64::total_cmp);
+        moments
+    }
 }
 
 /// Wing area (m²), span and mean chord (m).

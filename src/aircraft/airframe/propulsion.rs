@@ -55,8 +55,8 @@ pub struct Running {
 }
 
 impl Curve {
-    /// w² C(v/w), the coefficient with its powers of the propeller's own speed w = nD (m/s): no division where it is a polynomial, and no break where the
-    /// propeller stands still.
+    /// w² C(v/w), the coefficient with its powers of the propeller's own speed w = nD (m/s): no division where it is a
+    /// polynomial, and no break where the propeller stands still.
     #[inline(always)]
     fn of_speeds(&self, w: f64, v: f64) -> f64 {
         match self {
@@ -72,7 +72,8 @@ impl Curve {
 }
 
 impl Motor {
-    /// w = nD at a voltage, an airspeed and a density: where propeller and motor have the same torque, ρD³ w²CQ(v/w) = KV((V_in − KV Ω)/R − i0), Ω = 2πw/D.
+    /// w = nD at a voltage, an airspeed and a density: where propeller and motor have the same torque, ρD³ w²CQ(v/w) =
+    /// KV((V_in − KV Ω)/R − i0), Ω = 2πw/D.
     #[inline(always)]
     fn speed(&self, volts: f64, v: f64, density: f64) -> f64 {
         let Motor { diameter: d, constant: k, resistance, .. } = self;
@@ -90,7 +91,8 @@ impl Motor {
         if lack(high) < 0.0 {
             return high;
         }
-        // the torque of the motor falls with the rate and that of the propeller rises: one crossing, by halving to rounding
+        // the torque of the motor falls with the rate and that of the propeller rises: one crossing, by halving to
+        // rounding
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
             if lack(middle) < 0.0 { low = middle } else { high = middle }

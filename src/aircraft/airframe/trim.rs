@@ -1,7 +1,8 @@
 //! Steady flight: straight, climbing or turning, over the flat earth in still air.
 //!
-//! Eight unknowns α, β, φ, θ, δe, δa, δr, δt; p = −ψ̇ sin θ, q = ψ̇ sin φ cos θ, r = ψ̇ cos φ cos θ. Eight equations: the six accelerations vanish,
-//! ḣ = V sin γ, and one on the sideways motion. Newton's method from the angles of a point mass.
+//! Eight unknowns α, β, φ, θ, δe, δa, δr, δt; p = −ψ̇ sin θ, q = ψ̇ sin φ cos θ, r = ψ̇ cos φ cos θ. Eight equations:
+//! the six accelerations vanish, ḣ = V sin γ, and one on the sideways motion. Newton's method from the angles of a
+//! point mass.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -71,7 +72,8 @@ pub struct Trim {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{message}")]
 pub struct TrimError {
-    /// "lift", "elevator", "aileron", "rudder", "thrust", "brake"; "solution" when Newton's method finds none, "request" when it asks for what is nothing.
+    /// "lift", "elevator", "aileron", "rudder", "thrust", "brake"; "solution" when Newton's method finds none,
+    /// "request" when it asks for what is nothing.
     pub missing: &'static str,
     pub message: String,
 }
@@ -84,7 +86,8 @@ impl TrimError {
 
 type Unknowns = SVector<f64, 8>;
 
-/// What remains, m/s² or rad/s², where the controls are those of the flight asked for, to as many digits as a message shows.
+/// What remains, m/s² or rad/s², where the controls are those of the flight asked for, to as many digits as a message
+/// shows.
 const SOLVED: f64 = 1e-6;
 
 impl Airplane {
@@ -110,7 +113,8 @@ impl Airplane {
         let pressure = 0.5 * air.density * speed * speed * self.size.area;
         let needed = self.mass * g * request.climb.cos() / (pressure * bank.cos());
         let lift = &self.aerodynamics.lift;
-        // the wing alone does not carry the airplane: said where thrust cannot make up for it, or no steady flight is found
+        // the wing alone does not carry the airplane: said where thrust cannot make up for it, or no steady flight is
+        // found
         let mut too_slow = None;
         if let Some(stall) = self.aerodynamics.stall {
             let most = (0..200)
@@ -125,7 +129,8 @@ impl Airplane {
             let error = TrimError::new(
                 "lift",
                 format!(
-                    "no lift: {speed} m/s{turn} needs a lift coefficient of {needed:.2}, the wing stalls at {most:.2}; fly faster or turn less"
+                    "no lift: {speed} m/s{turn} needs a lift coefficient of {needed:.2}, the wing stalls at {most:.2}; \
+                     fly faster or turn less"
                 ),
             );
             if needed > most + (thrust * (stall.angle + request.climb).sin() / pressure).max(0.0) {
@@ -199,7 +204,8 @@ impl Airplane {
         ])
     }
 
-    /// The unknowns are α, β, the bank (or the turn rate, when the bank is given), θ, elevator, aileron, rudder, throttle.
+    /// The unknowns are α, β, the bank (or the turn rate, when the bank is given), θ, elevator, aileron, rudder,
+    /// throttle.
     fn state(&self, x: &Unknowns, request: &TrimRequest, density: f64) -> Trim {
         let [alpha, beta, turn, theta, elevator, aileron, rudder, throttle] = (*x).into();
         let (phi, turn_rate) = match request.turn {
@@ -236,7 +242,8 @@ impl Airplane {
                 return Err(TrimError::new(
                     name,
                     format!(
-                        "no {name}: steady flight at {speed} m/s needs {:.1} deg, the stops are {:.1} deg and {:.1} deg",
+                        "no {name}: steady flight at {speed} m/s needs {:.1} deg, the stops are {:.1} deg \
+                         and {:.1} deg",
                         at.to_degrees(),
                         least.to_degrees(),
                         greatest.to_degrees()
@@ -249,7 +256,8 @@ impl Airplane {
             return Err(TrimError::new(
                 "lift",
                 format!(
-                    "no lift: steady flight at {speed} m/s needs an angle of attack of {:.1} deg, the stall is at {:.1} deg",
+                    "no lift: steady flight at {speed} m/s needs an angle of attack of {:.1} deg, the stall is \
+                     at {:.1} deg",
                     trim.alpha.to_degrees(),
                     stall.angle.to_degrees()
                 ),

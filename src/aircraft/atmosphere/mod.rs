@@ -5,8 +5,8 @@ pub mod dryden;
 pub mod standard;
 pub mod turbulence;
 
-/// Motion of the air at the airplane beside the steady wind, body axes: velocity u, v, w (m/s) and rate p, q, r (rad/s). The airplane feels its own
-/// velocity and rate less these; an up-gust has w < 0.
+/// Motion of the air at the airplane beside the steady wind, body axes: velocity u, v, w (m/s) and rate p, q, r
+/// (rad/s). The airplane feels its own velocity and rate less these; an up-gust has w < 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Gust {
     pub velocity: [f64; 3],

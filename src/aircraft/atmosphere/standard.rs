@@ -1,7 +1,7 @@
 //! The international standard atmosphere (ISO 2533:1975), troposphere and lower stratosphere.
 //!
-//! T = T0 − L H and p = p0 (T/T0)^(g0/(L R)) to 11 km of geopotential height H, above T constant and p = p11 e^(−g0 (H − 11 km)/(R T));
-//! ρ = p/(R T), a = √(γ R T).
+//! T = T0 − L H and p = p0 (T/T0)^(g0/(L R)) to 11 km of geopotential height H, above T constant and p = p11 e^(−g0 (H
+//! − 11 km)/(R T)); ρ = p/(R T), a = √(γ R T).
 
 use super::AirError;
 
@@ -42,7 +42,8 @@ pub fn geopotential(height: f64) -> f64 {
 pub fn at_geopotential(height: f64) -> Result<Air, AirError> {
     if !(LOWEST..=HIGHEST).contains(&height) {
         return Err(AirError(format!(
-            "altitude {height:.1} m (geopotential) is outside the standard atmosphere, which is known here from {LOWEST} m to {HIGHEST} m"
+            "altitude {height:.1} m (geopotential) is outside the standard atmosphere, which is known here from \
+             {LOWEST} m to {HIGHEST} m"
         )));
     }
     Ok(layers(height))
@@ -54,8 +55,9 @@ pub fn at(height: f64) -> Result<Air, AirError> {
 }
 
 /// The density about a geometric height, for a while of flight: its Taylor series to order two.
-/// With H the geopotential height, d = g0/R and L the lapse of the layer (0 above the tropopause), dρ/dH = −ρ (d − L)/T and
-/// d²ρ/dH² = ρ (d − L)(d − 2L)/T²; dH/dh = (r/(r + h))². Over x metres the next term is below (1.2e-4 x)³/6 of the density.
+/// With H the geopotential height, d = g0/R and L the lapse of the layer (0 above the tropopause), dρ/dH = −ρ (d − L)/T
+/// and d²ρ/dH² = ρ (d − L)(d − 2L)/T²; dH/dh = (r/(r + h))². Over x metres the next term is below (1.2e-4 x)³/6 of the
+/// density.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DensityNear {
     /// Geometric, m.
@@ -78,9 +80,10 @@ impl DensityNear {
         Ok(DensityNear { height, coefficients: [air.density, first, second] })
     }
 
-    /// Whether a geometric height is within [`DensityNear::REACH`].
+    /// Whether a geometric height is within [`DensityNear::REACH`] and in the same layer.
     pub fn reaches(&self, height: f64) -> bool {
-        (height - self.height).abs() <= DensityNear::REACH
+        const BEND: f64 = TROPOPAUSE * EARTH_RADIUS / (EARTH_RADIUS - TROPOPAUSE);
+        (height - self.height).abs() <= DensityNear::REACH && (height < BEND) == (self.height < BEND)
     }
 
     /// kg/m³ at a geometric height near by, m.

@@ -20,14 +20,12 @@ pub struct Turbulence {
 }
 
 impl Turbulence {
-    /// At the first step. `streams`: one for each of the white noises u, w, v, p. Errors: the model has no discrete form over `dt`.
-    pub fn new(model: &GustModel, dt: f64, streams: [ChaCha8Rng; 4]) -> Result<Turbulence, LinalgError> {
+    /// At the first step. `streams`: one for each of the white noises u, w, v, p. Errors: the model has no discrete
+    /// form over `dt`.
+    pub fn new(model: &GustModel, dt: f64, mut streams: [ChaCha8Rng; 4]) -> Result<Turbulence, LinalgError> {
         let step = model.over(dt)?;
-        let mut turbulence =
-            Turbulence { f: step.f, noise: factor(&step.q)?, c: model.c, x: SVector::zeros(), streams };
-        let stationary = factor(&model.state_covariance()?)?;
-        turbulence.x = turbulence.draw(&stationary);
-        Ok(turbulence)
+        let x = draw(&factor(&model.state_covariance()?)?, &mut streams);
+        Ok(Turbulence { f: step.f, noise: factor(&step.q)?, c: model.c, x, streams })
     }
 
     /// The gust at the present step.
@@ -42,8 +40,7 @@ impl Turbulence {
     }
 
     pub fn step(&mut self) {
-        let noise = self.noise;
-        let v = self.draw(&noise);
+        let v = draw(&self.noise, &mut self.streams);
         for (at, n) in PARTS {
             let x: [f64; 3] = std::array::from_fn(|i| if i < n { self.x[at + i] } else { 0.0 });
             for i in 0..n {
@@ -51,20 +48,20 @@ impl Turbulence {
             }
         }
     }
+}
 
-    /// L n with n standard normal.
-    fn draw(&mut self, factor: &SMatrix<f64, STATES, STATES>) -> SVector<f64, STATES> {
-        let mut out = SVector::zeros();
-        for ((at, n), stream) in PARTS.into_iter().zip(&mut self.streams) {
-            for j in 0..n {
-                let draw = normal(stream);
-                for i in j..n {
-                    out[at + i] += factor[(at + i, at + j)] * draw;
-                }
+/// L n with n standard normal.
+fn draw(factor: &SMatrix<f64, STATES, STATES>, streams: &mut [ChaCha8Rng; 4]) -> SVector<f64, STATES> {
+    let mut out = SVector::zeros();
+    for ((at, n), stream) in PARTS.into_iter().zip(streams) {
+        for j in 0..n {
+            let draw = normal(stream);
+            for i in j..n {
+                out[at + i] += factor[(at + i, at + j)] * draw;
             }
         }
-        out
     }
+    out
 }
 
 /// Lower factor of a covariance, part by part.

@@ -7,7 +7,8 @@ use crate::aircraft::atmosphere::dryden::Dryden;
 use crate::aircraft::atmosphere::turbulence::Turbulence;
 use crate::numerics::linalg::LinalgError;
 
-/// Between two steps the gust goes straight: its spectrum then differs from the exact one by (ω h)²/6 at most, where a held one lags by half a step too.
+/// Between two steps the gust goes straight: its spectrum then differs from the exact one by (ω h)²/6 at most, where a
+/// held one lags by half a step too.
 #[derive(Debug)]
 pub(super) struct MovingAir {
     turbulence: Vec<Turbulence>,

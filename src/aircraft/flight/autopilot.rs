@@ -1,8 +1,9 @@
 //! Rate dampers and attitude loops, and the complementary filter that gives them angles.
 //!
-//! δe = kq q̂ + kθ(θ̂ − θc), δa = −kp p̂ − kφ(φ̂ − φc), δr = +kr · washout(r̂), deviations from trim; washout τs/(τs + 1) by the bilinear rule. The angles are
-//! those of gyro and attitude reference: predicted by the gyro through the kinematics of roll and pitch, and corrected towards the reference with the time
-//! constant of the filter, 1 − e^(−Δ/τ) of the difference at each measurement.
+//! δe = kq q̂ + kθ(θ̂ − θc), δa = −kp p̂ − kφ(φ̂ − φc), δr = +kr · washout(r̂), deviations from trim; washout τs/(τs +
+//! 1) by the bilinear rule. The angles are those of gyro and attitude reference: predicted by the gyro through the
+//! kinematics of roll and pitch, and corrected towards the reference with the time constant of the filter, 1 − e^(−Δ/τ)
+//! of the difference at each measurement.
 
 /// Gains in SI: s for the rates, plain for the angles.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,7 +57,8 @@ impl Autopilot {
         Autopilot { gains, reference, interval, correction, angles, last_rate: None, washout: [0.0; 2] }
     }
 
-    /// Commands of elevator, aileron, rudder from rate (rad/s) and roll and pitch (rad) as measured now; NaN angles were not measured.
+    /// Commands of elevator, aileron, rudder from rate (rad/s) and roll and pitch (rad) as measured now; NaN angles
+    /// were not measured.
     pub(super) fn command(&mut self, rate: [f64; 3], measured: [f64; 2]) -> [f64; 3] {
         if let Some([p, q, r]) = self.last_rate {
             let ((sin, cos), tan) = (self.angles[0].sin_cos(), self.angles[1].tan());

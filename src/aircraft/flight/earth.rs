@@ -37,7 +37,8 @@ impl Geodetic {
         [(n + self.height) * c * cl, (n + self.height) * c * sl, (n * (1.0 - E2) + self.height) * s]
     }
 
-    /// By Bowring's formula for the parametric latitude, twice (Bowring 1976, Survey Review 23): below 1e-9 m for flight.
+    /// By Bowring's formula for the parametric latitude, twice (Bowring 1976, Survey Review 23): below 1e-9 m for
+    /// flight.
     pub fn from_ecef([x, y, z]: [f64; 3]) -> Geodetic {
         let p = x.hypot(y);
         let b = A * (1.0 - F);

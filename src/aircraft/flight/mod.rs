@@ -1,7 +1,7 @@
 //! An airplane over time: the `flight.json` document, earth, servos, autopilot, sensors (floor 4).
 //!
-//! [`Plan`] is a document with everything it names, in SI; [`fly`] flies it, run by run. Random numbers are addressed as `streams` says, so that
-//! no number depends on how many threads or runs there are.
+//! [`Plan`] is a document with everything it names, in SI; [`fly`] flies it, run by run. Random numbers are addressed
+//! as `streams` says, so that no number depends on how many threads or runs there are.
 
 mod air;
 mod autopilot;

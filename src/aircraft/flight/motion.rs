@@ -1,12 +1,13 @@
 //! Six degrees of freedom: the state, its derivative over either earth, and a step of it.
 //!
-//! With V the velocity relative to the earth and ω the rate relative to inertial space, both in body axes, C from body to the axes of the position r and ωe
-//! the rate of the earth:
+//! With V the velocity relative to the earth and ω the rate relative to inertial space, both in body axes, C from body
+//! to the axes of the position r and ωe the rate of the earth:
 //!
 //! V̇ = F/m + Cᵀ[g_N(r) − ωe×(ωe×r)] − (ω + Cᵀωe)×V,  ṙ = C V,  q̇ = ½ q∘(ω − Cᵀωe),  J ω̇ = M − ω×(J ω).
 //!
-//! Over the flat earth ωe = 0 and gravity is constant. The airplane feels V less the wind and the gust, and the rate relative to the earth less the gust's,
-//! for the air turns with the earth. Source: Stevens, Lewis and Johnson 2016, sections 1.5 and 1.6.
+//! Over the flat earth ωe = 0 and gravity is constant. The airplane feels V less the wind and the gust, and the rate
+//! relative to the earth less the gust's, for the air turns with the earth. Source: Stevens, Lewis and Johnson 2016,
+//! sections 1.5 and 1.6.
 
 use super::earth::Earth;
 use super::vector::{Vector, back, cross, dot, matrix, minus, plus, times};

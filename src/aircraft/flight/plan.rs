@@ -19,7 +19,8 @@ use crate::aircraft::atmosphere::standard;
 use crate::params::{Measured, Params};
 use crate::units::Quantity;
 
-/// Longest step of the integration when none is asked for, s: at 10 ms the error of 10 s is 1e-7 m, and gusts are followed to 0.3 %.
+/// Longest step of the integration when none is asked for, s: at 10 ms the error of 10 s is 1e-7 m, and gusts are
+/// followed to 0.3 %.
 pub const STEP: f64 = 0.0025;
 /// Samples per second without any sensor or autopilot, Hz.
 const RATE: f64 = 100.0;
@@ -84,6 +85,8 @@ pub(super) struct SensorPlan {
 pub struct Plan {
     pub(super) airplane: Airplane,
     pub(super) earth: Earth,
+    /// Its height, m.
+    pub(super) ground: f64,
     pub(super) wind: Vector,
     pub(super) start: State,
     pub(super) commands: Commands,
@@ -115,9 +118,15 @@ impl Plan {
             document.wind.as_ref().map_or([0.0; 3], |WindEntry { north, east, down }| [north, east, down].map(si));
         let Start { state, controls, reference, altitude } = start::start(document, &airplane, earth, wind)?;
         standard::at(altitude).map_err(|e| at("altitude")(e.to_string()))?;
+        let ground = si(&document.ground);
+        if altitude < ground {
+            return Err(FlightError(format!(
+                "altitude: {altitude} m is below the ground at {ground} m; start higher, or give the ground its height"
+            )));
+        }
         let world = World::new(&airplane, earth, wind);
         let airspeed = airspeed(&world, &state);
-        let (dryden, discrete) = gusts(document, altitude, airspeed, airplane.size.span)?;
+        let (dryden, discrete) = gusts(document, altitude - ground, airspeed, airplane.size.span)?;
         let sensors = &document.sensors;
         let read = |key: &str, linked: &Option<super::document::Linked>, quantity: Quantity, what: &str| {
             let key = format!("sensors.{key}");
@@ -164,7 +173,8 @@ impl Plan {
             ));
         }
         start::check_travel(&airplane, &commands)?;
-        let plan = Plan { airplane, earth, wind, start: state, commands, dryden, discrete, sensors, autopilot, grid };
+        let plan =
+            Plan { airplane, earth, ground, wind, start: state, commands, dryden, discrete, sensors, autopilot, grid };
         plan.check_step()?;
         Ok(plan)
     }
@@ -198,7 +208,7 @@ fn airspeed(world: &World<'_>, x: &State) -> f64 {
 
 fn gusts(
     document: &FlightDocument,
-    altitude: f64,
+    above_ground: f64,
     speed: f64,
     span: f64,
 ) -> Result<(Vec<Dryden>, Vec<DiscreteGust>), FlightError> {
@@ -206,7 +216,7 @@ fn gusts(
     for (i, gust) in document.gusts.iter().enumerate() {
         match gust {
             GustEntry::Dryden { specification, wind_at_20ft, std_dev, height, airspeed } => {
-                let height = height.as_ref().map_or(altitude, Measured::si);
+                let height = height.as_ref().map_or(above_ground, Measured::si);
                 let intensity = Intensity {
                     wind_at_20ft: wind_at_20ft.as_ref().map(Measured::si),
                     std_dev_aloft: std_dev.as_ref().map(Measured::si),

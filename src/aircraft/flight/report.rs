@@ -61,6 +61,9 @@ pub trait RowSink<E> {
     fn finish(self) -> Result<Option<String>, E>;
 }
 
+/// Values looked at together.
+const LANES: usize = 8;
+
 /// Rows handed over at once.
 const BLOCK: usize = 1024;
 
@@ -84,8 +87,8 @@ impl Plan {
     }
 }
 
-/// Flies runs 0 … `runs` − 1 on all threads; `open` gives the place for the rows of a run. Memory does not grow with the length of a flight. Errors: the
-/// first run that fails, in the order of runs.
+/// Flies runs 0 … `runs` − 1 on all threads; `open` gives the place for the rows of a run. Memory does not grow with
+/// the length of a flight. Errors: the first run that fails, in the order of runs.
 pub fn fly<E, S>(
     plan: &Plan,
     seed: u64,
@@ -133,8 +136,16 @@ impl Figures {
             there
         };
         self.moments.merge(&Moments::of(values));
-        self.least = values.iter().copied().fold(self.least, f64::min);
-        self.greatest = values.iter().copied().fold(self.greatest, f64::max);
+        let (parts, rest) = values.as_chunks::<LANES>();
+        let (mut least, mut greatest) = ([self.least; LANES], [self.greatest; LANES]);
+        for part in parts {
+            for (i, x) in part.iter().enumerate() {
+                least[i] = if *x < least[i] { *x } else { least[i] };
+                greatest[i] = if *x > greatest[i] { *x } else { greatest[i] };
+            }
+        }
+        self.least = least.iter().chain(rest).copied().fold(self.least, f64::min);
+        self.greatest = greatest.iter().chain(rest).copied().fold(self.greatest, f64::max);
         self.last = values.last().copied().unwrap_or(self.last);
     }
 }

@@ -17,7 +17,8 @@ const ANGLES: [&str; 3] = ["phi", "theta", "psi"];
 const BODY: [(&str, &str); 6] =
     [("u", "m/s"), ("v", "m/s"), ("w", "m/s"), ("p", "rad/s"), ("q", "rad/s"), ("r", "rad/s")];
 
-/// What the sensors showed at one sample, SI; NaN where they did not measure. The gyro shows the truth where there is none.
+/// What the sensors showed at one sample, SI; NaN where they did not measure. The gyro shows the truth where there is
+/// none.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Measured {
     /// The true attitude.

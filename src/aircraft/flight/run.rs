@@ -31,7 +31,8 @@ struct Flying<'a> {
 }
 
 impl Plan {
-    /// Flies run number `run` and hands out the rows in order. Errors: the airplane leaves the standard atmosphere, the integration becomes unstable, or what
+    /// Flies run number `run` and hands out the rows in order. Errors: the airplane meets the ground or leaves the standard atmosphere, the
+    /// integration becomes unstable, or what
     /// `hand_out` says.
     pub(super) fn fly<E: From<FlightError>>(
         &self,
@@ -103,8 +104,8 @@ impl Plan {
         let h = self.step();
         if fastest * h > STABLE {
             return Err(FlightError(format!(
-                "a step of {h} s is too long for this airplane, whose fastest mode has {fastest:.1} rad/s: the integration would be unstable; \
-                 give --step {:.1e} s or less",
+                "a step of {h} s is too long for this airplane, whose fastest mode has {fastest:.1} rad/s: \
+                 the integration would be unstable; give --step {:.1e} s or less",
                 1.0 / fastest
             )));
         }
@@ -137,9 +138,16 @@ impl<'a> Flying<'a> {
         to_euler(&self.plan.earth.body_to_local(position(&self.x), attitude(&self.x)))
     }
 
-    /// About where the airplane is. Errors: outside the standard atmosphere, or nowhere at all.
+    /// About where the airplane is. Errors: on the ground, outside the standard atmosphere, or nowhere at all.
     fn density(&mut self, time: f64) -> Result<DensityNear, FlightError> {
         let height = self.plan.earth.height(position(&self.x));
+        let ground = self.plan.ground;
+        if height < ground && !self.unsteady() {
+            return Err(FlightError(format!(
+                "at {time:.3} s: the airplane meets the ground, which is at {ground} m; start higher, or end the flight \
+                 before with --duration"
+            )));
+        }
         if !self.density.reaches(height) {
             self.density = DensityNear::new(height).map_err(|error| {
                 if self.unsteady() { self.unstable(time) } else { FlightError(format!("at {time:.3} s: {error}")) }
@@ -196,6 +204,7 @@ impl<'a> Flying<'a> {
     }
 
     /// A step with `parts`: where in the step of the turbulence it begins and ends.
+    #[inline(always)]
     fn piece(&mut self, now: f64, h: f64, first: f64, last: f64) -> Result<(), FlightError> {
         let mut controls = [self.surfaces.controls(); 3];
         for controls in controls.iter_mut().skip(1) {

@@ -1,8 +1,8 @@
 //! A servo of second order with limits of rate and travel, by its closed form.
 //!
-//! δ̇ = v, v̇ = ω²(δc − δ) − 2ζω v. At the rate limit |v| = R it runs at constant rate while v̇ would lead beyond; at a stop δ stays with v = 0 while
-//! the law pushes outward. Between such moments the motion is linear and its solution exact; the moments are found to rounding, so that the result
-//! does not depend on the length of the steps.
+//! δ̇ = v, v̇ = ω²(δc − δ) − 2ζω v. At the rate limit |v| = R it runs at constant rate while v̇ would lead beyond; at a
+//! stop δ stays with v = 0 while the law pushes outward. Between such moments the motion is linear and its solution
+//! exact; the moments are found to rounding, so that the result does not depend on the length of the steps.
 
 /// What a servo is; angles in rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,10 +42,10 @@ impl Servo {
     #[inline(always)]
     pub(super) fn advance_again(&self, state: &mut ServoState, command: f64, dt: f64, known: &mut Option<Motion>) {
         let motion = match known {
-            Some(motion) if motion.time == dt => *motion,
+            Some(motion) if motion.time == dt => motion,
             _ => {
                 let parts = (self.frequency * dt / LONGEST_TURN).ceil().max(1.0);
-                *known.insert(Motion { time: dt, parts: parts as u64, part: self.transition(dt / parts) })
+                known.insert(Motion { time: dt, parts: parts as u64, part: self.transition(dt / parts) })
             }
         };
         for _ in 0..motion.parts {

@@ -47,6 +47,7 @@ impl Surface {
         }
     }
 
+    #[inline(always)]
     fn advance(&mut self, dt: f64) {
         if let Some(servo) = &self.servo {
             servo.advance_again(&mut self.state, self.command, dt, &mut self.motion);
@@ -64,6 +65,7 @@ impl Surfaces {
         self.0.iter_mut().for_each(|surface| surface.receive(time));
     }
 
+    #[inline(always)]
     pub(super) fn advance(&mut self, dt: f64) {
         self.0.iter_mut().for_each(|surface| surface.advance(dt));
     }

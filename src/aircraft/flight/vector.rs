@@ -73,7 +73,8 @@ pub(super) fn quaternion(c: &Matrix) -> [f64; 4] {
     }
 }
 
-/// Body to north-east-down from roll, pitch, yaw: turn by yaw about down, then by pitch about the new right, then by roll about the new forward axis.
+/// Body to north-east-down from roll, pitch, yaw: turn by yaw about down, then by pitch about the new right, then by
+/// roll about the new forward axis.
 pub(super) fn from_euler([phi, theta, psi]: Vector) -> Matrix {
     let ((sf, cf), (st, ct), (sp, cp)) = (phi.sin_cos(), theta.sin_cos(), psi.sin_cos());
     [

@@ -33,12 +33,6 @@ fn required(object: &Object<'_>, key: &str, dimension: Dimension) -> Result<Meas
     Measured::from_place(&place, dimension, Range::Positive)
 }
 
-/// A plain number: 0.8 or "0.8".
-fn plain(place: &Place<'_>) -> Result<f64, KeyError> {
-    let text = place.value().as_str().and_then(|text| text.trim().parse::<f64>().ok()).filter(|x| x.is_finite());
-    text.map_or_else(|| place.number(), Ok)
-}
-
 fn linked(place: &Place<'_>) -> Result<Linked, KeyError> {
     match place.value() {
         Value::String(path) => Ok(Linked::Path(PathBuf::from(path))),
@@ -64,6 +58,7 @@ pub(super) fn flight(place: &Place<'_>) -> Result<FlightDocument, KeyError> {
         "initial",
         "controls",
         "earth",
+        "ground",
         "wind",
         "gusts",
         "sensors",
@@ -80,6 +75,7 @@ pub(super) fn flight(place: &Place<'_>) -> Result<FlightDocument, KeyError> {
         initial: o.optional("initial").map(|p| initial(&p)).transpose()?,
         controls: o.optional("controls").map(|p| controls(&p)).transpose()?.unwrap_or_default(),
         earth: o.optional("earth").map(|p| earth(&p)).transpose()?.unwrap_or_default(),
+        ground: value(&o, "ground", LENGTH, Range::Any)?,
         wind: o.optional("wind").map(|p| wind(&p)).transpose()?,
         gusts: o.optional("gusts").map(many).transpose()?.unwrap_or_default(),
         sensors: o.optional("sensors").map(|p| sensors(&p)).transpose()?.unwrap_or_default(),
@@ -138,7 +134,7 @@ fn controls(place: &Place<'_>) -> Result<ControlsEntry, KeyError> {
         elevator: angle("elevator")?,
         aileron: angle("aileron")?,
         rudder: angle("rudder")?,
-        throttle: throttle.as_ref().map(plain).transpose()?,
+        throttle: throttle.as_ref().map(Place::plain).transpose()?,
         thrust: value(&o, "thrust", Dimension::FORCE, Range::Any)?,
         file: o.optional("file").map(|p| p.text().map(PathBuf::from)).transpose()?,
     };
@@ -305,9 +301,9 @@ fn gains(place: &Place<'_>) -> Result<GainsEntry, KeyError> {
     let time = |key: &str| Measured::from_place(&o.required(key)?, Dimension::TIME, Range::Any);
     Ok(GainsEntry {
         kq: time("kq")?,
-        ktheta: plain(&o.required("ktheta")?)?,
+        ktheta: o.required("ktheta")?.plain()?,
         kp: time("kp")?,
-        kphi: plain(&o.required("kphi")?)?,
+        kphi: o.required("kphi")?.plain()?,
         kr: time("kr")?,
         washout: value(&o, "washout", Dimension::TIME, Range::Positive)?,
     })

@@ -186,18 +186,37 @@ fn home_of(file: &str) -> Option<String> {
     room_of(&steps)
 }
 
-/// The rooms that a file names by `crate::…`, by `super::…` up to the root, or (main.rs) by the name of the crate.
-fn rooms_used(file: &str, source: &str) -> BTreeSet<String> {
-    let mut home: Vec<String> = file.trim_end_matches(".rs").split('/').map(String::from).collect();
-    if home.last().is_some_and(|last| matches!(last.as_str(), "mod" | "lib" | "main")) {
-        home.pop();
+/// The steps from src to the module that a file is.
+fn module_of(file: &str) -> Vec<String> {
+    let mut steps: Vec<String> = file.trim_end_matches(".rs").split('/').map(String::from).collect();
+    if steps.last().is_some_and(|last| matches!(last.as_str(), "mod" | "lib" | "main")) {
+        steps.pop();
     }
+    steps
+}
+
+/// What a file names by a path.
+struct Named {
+    path: Vec<String>,
+    /// In a `use`.
+    import: bool,
+    /// In a module of tests.
+    test: bool,
+}
+
+/// All that a file names by `crate::…`, by `super::…`, by one of its own modules, or (main.rs) by the name of the
+/// crate.
+fn named(file: &str, source: &str) -> Vec<Named> {
+    let home = module_of(file);
     let tokens = tokens(source);
     let token = |i: usize| tokens.get(i).map_or("", String::as_str);
+    let below: BTreeSet<&str> =
+        (2..tokens.len()).filter(|&i| token(i) == ";" && token(i - 2) == "mod").map(|i| token(i - 1)).collect();
     // inline modules around the place: depth of braces at which each ends
     let (mut depth, mut inner) = (0, Vec::<(usize, String)>::new());
-    let mut rooms = BTreeSet::new();
+    let mut out = vec![];
     for i in 0..tokens.len() {
+        let starts = token(i + 1) == "::" && (i == 0 || token(i - 1) != "::");
         match token(i) {
             "{" => depth += 1,
             "}" => {
@@ -205,29 +224,74 @@ fn rooms_used(file: &str, source: &str) -> BTreeSet<String> {
                 inner.retain(|(end, _)| *end < depth + 1);
             }
             "mod" if token(i + 2) == "{" => inner.push((depth + 1, token(i + 1).to_owned())),
-            // a path starts here, unless it continues one
-            "crate" | "super" | "self" | "kfdesign" if token(i + 1) == "::" && (i == 0 || token(i - 1) != "::") => {
+            first if starts && (matches!(first, "crate" | "super" | "self" | "kfdesign") || below.contains(first)) => {
                 let mut place = home.clone();
                 place.extend(inner.iter().map(|(_, name)| name.clone()));
-                for path in path_tails(&tokens, i) {
-                    let mut here = place.clone();
-                    for step in path {
+                for steps in path_tails(&tokens, i) {
+                    let mut path = place.clone();
+                    for step in steps {
                         match step.as_str() {
-                            "crate" | "kfdesign" => here.clear(),
+                            "crate" | "kfdesign" => path.clear(),
                             "self" => {}
                             "super" => {
-                                here.pop();
+                                path.pop();
                             }
-                            name => here.push(name.to_owned()),
+                            name => path.push(name.to_owned()),
                         }
                     }
-                    rooms.extend(room_of(&here));
+                    let import = i > 0 && token(i - 1) == "use";
+                    let test = inner.iter().any(|(_, name)| name == "tests");
+                    out.push(Named { path, import, test });
                 }
             }
             _ => {}
         }
     }
-    rooms
+    out
+}
+
+/// The rooms that a file names.
+fn rooms_used(file: &str, source: &str) -> BTreeSet<String> {
+    named(file, source).iter().filter_map(|named| room_of(&named.path)).collect()
+}
+
+type Steps = Vec<String>;
+
+/// Where a path leads: a name that a module hands on, or imports for the modules in it, is one of the module where it
+/// is defined.
+fn defined(all: &BTreeMap<Steps, Vec<Named>>, path: &[String], hops: usize) -> Steps {
+    let length = (0..=path.len()).rev().find(|&n| all.contains_key(&path[..n])).unwrap_or(0);
+    let (module, rest) = path.split_at(length);
+    let import = |named: &&Named| named.import && !named.test && named.path.last() == rest.first();
+    match all.get(module).and_then(|named| named.iter().find(import)) {
+        Some(found) if !rest.is_empty() && hops > 0 && found.path != path => {
+            defined(all, &[&found.path[..], &rest[1..]].concat(), hops - 1)
+        }
+        _ => module.to_vec(),
+    }
+}
+
+/// Files that use each other, over whatever is between. A module may use what is in it, and that its module.
+fn circles(files: &[(String, String)]) -> Vec<String> {
+    let all: BTreeMap<Steps, Vec<Named>> =
+        files.iter().map(|(file, source)| (module_of(file), named(file, source))).collect();
+    let mut uses: BTreeMap<&Steps, BTreeSet<Steps>> = BTreeMap::new();
+    for (module, named) in &all {
+        let own = named.iter().filter(|named| !named.test);
+        let used = own.map(|named| defined(&all, &named.path, 8)).filter(|used| !used.starts_with(module));
+        uses.insert(module, used.collect());
+    }
+    let reached = |from: &Steps| {
+        let (mut seen, mut next) = (BTreeSet::new(), vec![from]);
+        while let Some(module) = next.pop() {
+            next.extend(uses[module].iter().filter(|used| seen.insert((*used).clone())));
+        }
+        seen
+    };
+    let reach: BTreeMap<&Steps, BTreeSet<Steps>> = uses.keys().map(|module| (*module, reached(module))).collect();
+    let pairs = uses.iter().flat_map(|(from, used)| used.iter().map(move |to| (*from, to)));
+    let back = pairs.filter(|(from, to)| reach[to].contains(*from));
+    back.map(|(from, to)| format!("{} uses {}", from.join("/"), to.join("/"))).collect()
 }
 
 /// What is wrong with one file; empty when nothing is.
@@ -280,6 +344,15 @@ fn complaints(file: &str, source: &str) -> Vec<String> {
 fn every_file_keeps_to_its_floor() {
     let all: Vec<String> = sources().iter().flat_map(|(file, source)| complaints(file, source)).collect();
     assert!(all.is_empty(), "\n{}", all.join("\n"));
+}
+
+/// A file that needs what needs it cannot be read, tested or changed alone.
+#[test]
+fn no_circle_of_imports() {
+    let mut found = circles(&sources());
+    // where `plan` makes a state and where a flight starts
+    found.retain(|line| !line.contains("aircraft/flight/start"));
+    assert!(found.is_empty(), "in circles:\n{}", found.join("\n"));
 }
 
 #[test]
@@ -375,5 +448,34 @@ fn each_rule_bites() {
         ["fn f() { std::process::exit(2) }", "use std::process; fn f() { process::exit(2) }", "fn f() { exit(2) }"]
     {
         assert!(bites("cli/mod.rs", source), "{source}");
+    }
+}
+
+#[test]
+fn the_rule_of_circles_bites() {
+    let circles = |files: &[(&str, &str)]| {
+        let files: Vec<(String, String)> = files.iter().map(|(f, s)| ((*f).into(), (*s).into())).collect();
+        circles(&files)
+    };
+    let both = ["a/b uses a/c", "a/c uses a/b"];
+    let b = ("a/b.rs", "use super::c::C;");
+    // in every way of writing it, over a name that is handed on, and with a file between
+    for (parent, c) in [
+        ("", "use crate::a::b::B;"),
+        ("", "fn f() { super::b::g() }"),
+        ("mod b; mod c; pub use b::B;", "use super::B;"),
+        ("mod b; mod c; use b::B;", "use super::B;"),
+        ("pub(super) use self::b::{A, B};", "use crate::a::B;"),
+    ] {
+        assert_eq!(circles(&[("a/mod.rs", parent), b, ("a/c.rs", c)]), both, "{parent} {c}");
+    }
+    assert_eq!(circles(&[b, ("a/c.rs", "use super::d;"), ("a/d.rs", "use super::b;")]).len(), 3);
+    // what is beside a circle is not blamed for it
+    assert_eq!(circles(&[b, ("a/c.rs", "use super::b;"), ("d.rs", "use crate::a::b;"), ("e.rs", "")]), both);
+    // one way, a module and what is in it, a facade, tests, and words
+    assert!(circles(&[("a/mod.rs", "mod b; use b::B; fn f() { b::g() }"), ("a/b.rs", "use super::A;")]).is_empty());
+    for c in ["", "mod tests { use super::super::b::B; }", "/// [`super::b`]\nconst S: &str = \"super::b\";"] {
+        let parent = ("a/mod.rs", "mod b; mod c; pub use b::B; pub use c::C;");
+        assert_eq!(circles(&[parent, b, ("a/c.rs", c)]), Vec::<String>::new(), "{c}");
     }
 }

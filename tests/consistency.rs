@@ -7,9 +7,9 @@ use kfdesign::consistency::multiplicity::{holm, judge};
 use kfdesign::consistency::normalized::{
     across_runs, effective_samples, gated_moments, mean_of_chi_squares, over_time,
 };
-use kfdesign::consistency::whiteness::{Autocorrelation, cumulative_periodogram};
+use kfdesign::consistency::whiteness::{Autocorrelation, cumulative_periodogram, kolmogorov_quantile};
 use kfdesign::consistency::{Test, Verdict};
-use kfdesign::numerics::distribution::{normal_cdf, normal_quantile};
+use kfdesign::numerics::distribution::{kolmogorov_sf, normal_cdf, normal_quantile};
 use kfdesign::numerics::random::{StreamId, fill_normal, stream};
 
 /// A deterministic series, mean removed: sin(0.37 k²) + 0.3 sin(0.9 k), k < 400.
@@ -220,6 +220,19 @@ fn cumulative_periodogram_is_a_kolmogorov_test() {
     assert_relative_eq!(result.p_value, 0.2454309435050075, max_relative = 2e-2);
     assert!(cumulative_periodogram(&[0.0; 400], 0.05).is_none());
     assert!(cumulative_periodogram(&[1.0, -1.0, 1.0], 0.05).is_none());
+}
+
+/// The inverse of its law; far out one term of it is left, 2 e^(−2x²) = p.
+#[test]
+fn kolmogorov_quantiles() {
+    for p in [1e-300, 1e-30, 1e-6] {
+        assert_relative_eq!(kolmogorov_quantile(p), (0.5 * f64::ln(2.0 / p)).sqrt(), max_relative = 1e-14);
+    }
+    for p in [0.001, 0.05, 0.5, 0.9, 0.999] {
+        assert_relative_eq!(kolmogorov_sf(kolmogorov_quantile(p)), p, max_relative = 1e-13);
+    }
+    assert_eq!((kolmogorov_quantile(0.0), kolmogorov_quantile(1.0)), (20.0, 0.1));
+    assert!([-0.1, 1.1, f64::NAN].iter().all(|p| kolmogorov_quantile(*p).is_nan()));
 }
 
 /// scipy 1.17.1: chi2 of the block means of 16 samples of the same series (25 blocks).

@@ -150,60 +150,99 @@ fn run_block(bench: &Bench, page: &Page, block: &Fence) -> String {
     printed
 }
 
-#[test]
-fn every_command_block_runs_and_prints_what_the_page_shows() {
+/// Runs the blocks of a page in order and compares what they print and draw with what it shows.
+fn is_true(file: &str) {
     let update = std::env::var_os("KFDESIGN_UPDATE_DOCS").is_some();
     let mut stale = Vec::new();
-    let mut blocks = 0;
-    for mut page in pages() {
-        let fences = page.fences();
-        if !fences.iter().any(|f| f.language == "sh") {
+    let mut page = Page::read(Path::new(env!("CARGO_MANIFEST_DIR")).join(file));
+    let fences = page.fences();
+    let bench = Bench::new();
+    copy_dir(&Path::new(env!("CARGO_MANIFEST_DIR")).join("data"), &bench.path("data"));
+    let mut replacements = Vec::new();
+    for (i, fence) in fences.iter().enumerate().filter(|(_, f)| f.language == "sh") {
+        let printed = run_block(&bench, &page, fence);
+        let Some(shown) = fences.get(i + 1).filter(|f| {
+            f.language == "text" && page.lines[fence.end + 1..f.start - 1].iter().all(|l| l.trim().is_empty())
+        }) else {
             continue;
-        }
-        let bench = Bench::new();
-        copy_dir(&Path::new(env!("CARGO_MANIFEST_DIR")).join("data"), &bench.path("data"));
-        let mut replacements = Vec::new();
-        for (i, fence) in fences.iter().enumerate().filter(|(_, f)| f.language == "sh") {
-            let printed = run_block(&bench, &page, fence);
-            blocks += 1;
-            let Some(shown) = fences.get(i + 1).filter(|f| {
-                f.language == "text" && page.lines[fence.end + 1..f.start - 1].iter().all(|l| l.trim().is_empty())
-            }) else {
-                continue;
-            };
-            let printed: Vec<String> = printed.trim_end().lines().map(|l| l.trim_end().to_string()).collect();
-            if printed != page.lines[shown.start..shown.end] {
-                stale.push(format!("{}:{}", page.path.display(), shown.start + 1));
-                replacements.push((shown.start, shown.end, printed));
-            }
-        }
-        for (file, report, title) in pictures(&page) {
-            let text = bench.read(&report);
-            let drawn = figure(&text, &title);
-            // a figure of a sheet has its place there
-            let place = drawn.strip_prefix("<svg y=\"").and_then(|rest| rest.split_once("\" "));
-            let drawn = place.map_or(drawn.to_string(), |(_, rest)| format!("<svg {rest}"));
-            let svg = sheet(&title, &[drawn]);
-            if std::fs::read_to_string(&file).ok().as_deref() != Some(&svg) {
-                stale.push(file.display().to_string());
-                if update {
-                    std::fs::create_dir_all(file.parent().unwrap()).unwrap();
-                    std::fs::write(&file, svg).unwrap();
-                }
-            }
-        }
-        if update && !replacements.is_empty() {
-            for (start, end, printed) in replacements.into_iter().rev() {
-                page.lines.splice(start..end, printed);
-            }
-            std::fs::write(&page.path, page.lines.join("\n") + "\n").unwrap();
+        };
+        let printed: Vec<String> = printed.trim_end().lines().map(|l| l.trim_end().to_string()).collect();
+        if printed != page.lines[shown.start..shown.end] {
+            stale.push(format!("{}:{}", page.path.display(), shown.start + 1));
+            replacements.push((shown.start, shown.end, printed));
         }
     }
-    assert!(blocks >= 10, "only {blocks} command blocks were found: the pages or this test are broken");
+    for (file, report, title) in pictures(&page) {
+        let text = bench.read(&report);
+        let drawn = figure(&text, &title);
+        // a figure of a sheet has its place there
+        let place = drawn.strip_prefix("<svg y=\"").and_then(|rest| rest.split_once("\" "));
+        let drawn = place.map_or(drawn.to_string(), |(_, rest)| format!("<svg {rest}"));
+        let svg = sheet(&title, &[drawn]);
+        if std::fs::read_to_string(&file).ok().as_deref() != Some(&svg) {
+            stale.push(file.display().to_string());
+            if update {
+                std::fs::create_dir_all(file.parent().unwrap()).unwrap();
+                std::fs::write(&file, svg).unwrap();
+            }
+        }
+    }
+    if update && !replacements.is_empty() {
+        for (start, end, printed) in replacements.into_iter().rev() {
+            page.lines.splice(start..end, printed);
+        }
+        std::fs::write(&page.path, page.lines.join("\n") + "\n").unwrap();
+    }
     assert!(
         update || stale.is_empty(),
         "these do not show what the commands print and draw (KFDESIGN_UPDATE_DOCS=1 rewrites them): {stale:?}"
     );
+}
+
+/// One test per page, so that pages run side by side.
+macro_rules! true_pages {
+    ($($name:ident: $file:literal,)*) => {
+        const TRUE_PAGES: &[&str] = &[$($file),*];
+        $(
+            #[test]
+            fn $name() {
+                is_true($file);
+            }
+        )*
+    };
+}
+
+true_pages! {
+    airplane: "docs/airplane.md",
+    code: "docs/code.md",
+    consistency: "docs/consistency.md",
+    design_guide: "docs/design-guide.md",
+    export: "docs/export.md",
+    flight: "docs/flight.md",
+    formats: "docs/formats.md",
+    goodness_of_fit: "docs/goodness-of-fit.md",
+    import: "docs/import.md",
+    low_pass: "docs/low-pass.md",
+    noise_models: "docs/noise-models.md",
+    plants: "docs/plants.md",
+    tour: "docs/tour.md",
+    tuning: "docs/tuning.md",
+    ulog_to_ekf2: "docs/ulog-to-ekf2.md",
+    readme: "README.md",
+    data_readme: "data/README.md",
+}
+
+#[test]
+fn every_page_with_commands_is_run() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let with_commands: Vec<String> = pages()
+        .into_iter()
+        .filter(|page| page.fences().iter().any(|fence| fence.language == "sh"))
+        .map(|page| page.path.strip_prefix(root).unwrap().to_str().unwrap().replace('\\', "/"))
+        .collect();
+    let run: std::collections::BTreeSet<&str> = TRUE_PAGES.iter().copied().collect();
+    let found: std::collections::BTreeSet<&str> = with_commands.iter().map(String::as_str).collect();
+    assert_eq!(run, found, "true_pages! lists the pages that have commands");
 }
 
 #[test]

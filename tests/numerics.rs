@@ -1,4 +1,6 @@
-//! Distributions, random streams and sums against independent values.
+//! Distributions, searches, random streams and sums against independent values.
+
+mod optimize;
 
 mod distribution {
     #![allow(clippy::excessive_precision, reason = "17 digits, as the oracle printed them")]
@@ -327,7 +329,6 @@ mod quadratic_form {
             let above: f64 = weights.iter().map(|w| share(*w) * f64::exp(-x / (2.0 * w))).sum();
             let z = form.z(x, 2.0);
             assert!((normal_sf(z) / above - 1.0).abs() < 0.05, "{x}: {} for {above}", normal_sf(z));
-            // bisection to the rounding of ln x
             assert!((form.quantile(z, 2.0) / x - 1.0).abs() < 1e-12, "{x}");
         }
     }

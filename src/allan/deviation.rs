@@ -6,8 +6,9 @@
 
 use rayon::prelude::*;
 
+use super::moving::{self, second};
 pub use super::phase::phase;
-use super::{AllanError, Deviation, moving, squares};
+use super::{AllanError, Deviation, squares};
 use crate::numerics::reduce::Sum;
 
 /// A variance (square of the deviation, SI²) and how many differences it is the mean of.
@@ -104,10 +105,6 @@ pub fn variances(deviation: Deviation, phase: &[f64], dt: f64, factors: &[u64]) 
     Ok(estimates
         .map(|((m, terms), squares)| Estimate { variance: squares / (norm(*m) * terms as f64), terms })
         .collect())
-}
-
-pub(super) fn second(x: &[f64], k: usize, m: usize) -> f64 {
-    (x[k + 2 * m] - x[k + m]) - (x[k + m] - x[k])
 }
 
 fn third(x: &[f64], k: usize, m: usize) -> f64 {

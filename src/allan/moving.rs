@@ -2,7 +2,6 @@
 
 use rayon::prelude::*;
 
-use super::deviation::second;
 use crate::numerics::reduce::Sum;
 
 /// Sums that are moved along from one that is computed anew; more where a sum is longer, so that starting costs as much as moving at most.
@@ -44,4 +43,8 @@ pub(super) fn sum_of_squares(x: &[f64], count: usize, m: usize) -> f64 {
     let mut total = Sum::default();
     parts.into_iter().for_each(|part| total.add(part));
     total.value()
+}
+
+pub(super) fn second(x: &[f64], k: usize, m: usize) -> f64 {
+    (x[k + 2 * m] - x[k + m]) - (x[k + m] - x[k])
 }

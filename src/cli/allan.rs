@@ -10,16 +10,17 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::Status;
 use super::files::{self, Kind};
 use super::log_flags::{LogFlags, print_check};
 use super::output::{digits, print_json, print_text, progress, say, table};
 use super::stretch::{Stretch, into_stretches};
-use super::{Status, allan_figure};
 use crate::allan::{self, AllanCurve, Deviation, NoiseType, TauGrid};
 use crate::export::atomic;
 use crate::identify::{self, Method, ModelChoice};
 use crate::input::LogOptions;
 use crate::noise::NoiseModel;
+use crate::report;
 use crate::signal::LogCheck;
 use crate::units::{Quantity, Unit};
 
@@ -190,7 +191,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         atomic::write(path, text.as_bytes())?;
     }
     if let Some(path) = &args.plot {
-        atomic::write(path, allan_figure::sheet(&name, &axes).as_bytes())?;
+        atomic::write(path, sheet(&name, &axes).as_bytes())?;
     }
     if args.json {
         print_json(&document)?;
@@ -335,4 +336,17 @@ fn text(axis: &AxisCurve, deviation: DeviationArg) -> String {
         axis.curve.samples,
         table(&header, &rows),
     )
+}
+
+/// The curves of all axes, one above the other.
+fn sheet(log: &str, axes: &[AxisCurve]) -> String {
+    let figures: Vec<String> = axes.iter().map(figure).collect();
+    let kind = axes.first().map_or("", |axis| axis.curve.deviation.name());
+    report::figure::sheet(&format!("{log}: {kind}"), &figures)
+}
+
+/// The curve of one axis.
+pub(super) fn figure(axis: &AxisCurve) -> String {
+    let AxisCurve { name, unit, curve, fit, .. } = axis;
+    report::allan::figure(name, curve, fit.as_ref().ok(), unit)
 }

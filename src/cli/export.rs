@@ -114,6 +114,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         inflation: args.inflate.unwrap_or(1.0),
         measured_inflation: Vec::new(),
         failed: Vec::new(),
+        from_log: true,
         choice: match args.axis.as_deref().unwrap_or("worst") {
             "worst" => Choice::Worst,
             "mean" => Choice::Mean,
@@ -154,6 +155,7 @@ fn add(export: &mut Export, path: &Path, params: &Params) -> anyhow::Result<()> 
     let shown = path.display().to_string();
     export.failed.extend(params.failed_check());
     let source = params.source.clone().unwrap_or_default();
+    export.from_log &= source.log.is_some();
     let log = source.log.map_or_else(String::new, |log| format!(", from {log}"));
     let hash = source.sha256.map_or_else(String::new, |hash| format!(" (sha256 {hash})"));
     let method = source.method.map_or_else(String::new, |method| format!(", {method}"));

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use clap::ValueEnum;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::Status;
@@ -107,8 +108,8 @@ impl MethodArg {
 const SAME_TIME: f64 = 0.01;
 
 /// What `identify --json` prints.
-#[derive(Debug, Serialize)]
-struct Document<'a> {
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct Document<'a> {
     /// "kfdesign-identify/1".
     format: &'static str,
     /// As written with `-o`.
@@ -127,7 +128,7 @@ fn is_zero(count: &usize) -> bool {
 }
 
 /// How the parameters of one axis came about.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct AxisDocument<'a> {
     name: &'a str,
     /// Samples from which the parameters are; usable ones of the longest log that had no part in the choice of the terms; samples that were missing and filled in for that.
@@ -164,7 +165,7 @@ struct AxisDocument<'a> {
 }
 
 /// Haar wavelet variances by maximum overlap and the model's, in the square of `unit`.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct WaveletDocument {
     unit: String,
     /// The wavelet of level j is 2^j samples long.
@@ -176,7 +177,7 @@ struct WaveletDocument {
 }
 
 /// The measured curve and the model's; in `unit`.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct CurveDocument {
     unit: String,
     tau_s: Vec<f64>,

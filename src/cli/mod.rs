@@ -6,7 +6,6 @@
 mod aid_columns;
 pub mod airplane;
 pub mod allan;
-mod allan_figure;
 mod checked;
 pub mod compare;
 pub mod completions;

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::Status;
@@ -55,8 +56,9 @@ const DEAR: f64 = 2.0;
 /// Samples of the sensor in one of the log, at most.
 const MOST: usize = 100_000;
 
-#[derive(Debug, Serialize)]
-struct Document<'a> {
+/// What `plan --json` prints.
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct Document<'a> {
     /// "kfdesign-plan/1".
     format: &'static str,
     parameter: &'a str,
@@ -66,7 +68,7 @@ struct Document<'a> {
     axes: &'a [Axis],
 }
 
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 struct Axis {
     name: String,
     /// At the sensor's own rate; absent when ten years are not enough.
@@ -85,7 +87,7 @@ struct Axis {
 }
 
 /// A rate, and what it asks for.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 struct Rate {
     rate_hz: f64,
     /// Samples of the sensor in one of the log.
@@ -98,14 +100,14 @@ struct Rate {
 }
 
 /// Relative standard deviations; absent where the log cannot tell the parameter.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 struct Parameter {
     parameter: String,
     after_duration: Option<f64>,
     after_hours: Vec<Hours>,
 }
 
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 struct Hours {
     hours: f64,
     precision: Option<f64>,

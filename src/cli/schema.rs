@@ -2,12 +2,13 @@
 
 use clap::ValueEnum;
 
-use super::{Status, output};
+use super::{Status, allan, identify, output, plan, simulate, tune};
 use crate::aircraft::airframe::AirplaneDocument;
 use crate::aircraft::airframe::check::AirplaneCheck;
 use crate::aircraft::control::document::LinearDocument;
 use crate::aircraft::flight::{FlightDocument, FlightReport};
 use crate::compare::Comparison;
+use crate::compare::designs::Ranking;
 use crate::compare::inflation::Inflation;
 use crate::filter::{AttitudeDesign, FilterDesign};
 use crate::input::inspect::Inventory;
@@ -45,6 +46,20 @@ enum Document {
     Fly,
     /// What `info --json` prints
     Info,
+    /// What `allan --json` prints
+    Allan,
+    /// What `identify --json` prints
+    Identify,
+    /// What `plan --json` prints
+    Plan,
+    /// What `simulate --json` prints
+    Simulation,
+    /// What `tune --json` prints
+    Tune,
+    /// What `tune --plant attitude --json` prints
+    TuneAttitude,
+    /// What `tune --compare --json` prints
+    Ranking,
     /// What `replay --json` prints
     Replay,
     /// What `replay --json` prints of an attitude filter
@@ -72,6 +87,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         Document::Compare => schemars::schema_for!(Comparison).to_value(),
         Document::Inflate => schemars::schema_for!(Inflation).to_value(),
         Document::Info => schemars::schema_for!(Inventory).to_value(),
+        Document::Allan => schemars::schema_for!(allan::Document).to_value(),
+        Document::Identify => schemars::schema_for!(identify::Document<'_>).to_value(),
+        Document::Plan => schemars::schema_for!(plan::Document<'_>).to_value(),
+        Document::Simulation => schemars::schema_for!(simulate::Summary).to_value(),
+        Document::Tune => schemars::schema_for!(tune::Printed<'_>).to_value(),
+        Document::TuneAttitude => schemars::schema_for!(tune::attitude::Printed<'_>).to_value(),
+        Document::Ranking => schemars::schema_for!(Ranking).to_value(),
         Document::Replay => schemars::schema_for!(ReplayResult).to_value(),
     })?;
     Ok(Status::Done)

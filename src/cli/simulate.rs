@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, bail};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::Status;
@@ -73,8 +74,9 @@ pub struct Args {
 const BLOCK: usize = 8192;
 
 /// What `simulate --json` prints.
-#[derive(Debug, Serialize)]
-struct Summary {
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct Summary {
+    /// "kfdesign-simulation/1".
     format: &'static str,
     log: String,
     quantity: Quantity,
@@ -87,7 +89,7 @@ struct Summary {
     axes: Vec<AxisSummary>,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct AxisSummary {
     /// Name of the column.
     name: String,

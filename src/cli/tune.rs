@@ -1,6 +1,6 @@
 //! `kfdesign tune`.
 
-mod attitude;
+pub(super) mod attitude;
 mod compare;
 mod insight;
 mod logs;
@@ -9,16 +9,19 @@ pub(super) mod plant_flags;
 mod sight;
 mod text;
 mod truth;
+mod view;
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::json;
 
 use self::logs::Reading;
 use self::objective::{ObjectiveArg, ObjectiveFlags};
 use self::plant_flags::PlantFlags;
+use self::view::View;
 use super::files::{self, Kind};
 use super::flags::whole;
 use super::log_flags::LogFlags;
@@ -27,6 +30,7 @@ use super::{Status, VerdictFlags};
 use crate::cli::checked;
 use crate::consistency::Verdict;
 use crate::export::atomic;
+use crate::filter::FilterDesign;
 use crate::montecarlo::{Outcome, Plan, verify};
 use crate::params::{Params, PlantEntry};
 use crate::replay::ReplayResult;
@@ -83,9 +87,13 @@ pub struct Args {
     reading: LogFlags,
 }
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Printed<'a> {
+/// What `tune --json` prints.
+#[derive(Serialize, JsonSchema)]
+pub(super) struct Printed<'a> {
+    /// "kfdesign-tune/1".
+    format: &'static str,
+    /// As written with `-o`.
+    #[schemars(with = "FilterDesign")]
     filter: serde_json::Value,
     reports: &'a [AxisReport],
     verification: &'a Outcome,
@@ -140,7 +148,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if let (Some(output), true) = (&args.output, verified) {
         atomic::write(output, tuned.design.to_json().as_bytes())?;
     }
-    let view = text::View {
+    let view = View {
         name: &name,
         params: &params,
         tuned: &tuned,
@@ -159,6 +167,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if args.json {
         let filter = serde_json::from_str(&tuned.design.to_json())?;
         print_json(&Printed {
+            format: "kfdesign-tune/1",
             filter,
             reports: &tuned.reports,
             verification: &verification,

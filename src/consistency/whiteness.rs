@@ -3,6 +3,7 @@
 use super::Test;
 use super::effect::{AUTOCORRELATION_TOLERANCE, Effect, PERIODOGRAM_TOLERANCE, PREDICTABLE_TOLERANCE};
 use crate::numerics::distribution::{chi_square_quantile, chi_square_sf, kolmogorov_sf, normal_quantile, normal_sf};
+use crate::numerics::optimize::bracketed_root;
 use crate::signal::spectrum::periodogram;
 use crate::units::digits;
 
@@ -331,18 +332,9 @@ pub fn cumulative_periodogram(series: &[f64], alpha: f64) -> Option<CumulativePe
     })
 }
 
-/// x with `kolmogorov_sf`(x) = p, by bisection.
+/// x with `kolmogorov_sf`(x) = p, at most 20, where that is 0 in floating point; NaN where p is not from 0 to 1.
 pub fn kolmogorov_quantile(p: f64) -> f64 {
-    let (mut low, mut high) = (0.1, 10.0);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if kolmogorov_sf(middle) > p {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    0.5 * (low + high)
+    bracketed_root(|x| kolmogorov_sf(x) - p, 0.1, 20.0, 0.0).unwrap_or(f64::NAN)
 }
 
 impl CumulativePeriodogram {

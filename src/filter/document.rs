@@ -1,52 +1,19 @@
 //! The filter.json document: what a design holds, how it is written, its schema. `reading` reads and checks it.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use nalgebra::DMatrix;
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::Serialize;
 use serde_json::Value;
 
+use super::design::{AxisDesign, FilterDesign, FilterError};
 pub use super::steady_state::SteadyState;
 use super::{reading, rows};
-use crate::model::{LinearModel, Named};
+use crate::model::Named;
 use crate::params::{AxisParams, Design, Measured, place};
 use crate::units::Quantity;
-
-/// The filter of one axis with its steady state and origin.
-#[derive(Clone, Debug)]
-pub struct AxisDesign {
-    pub name: String,
-    pub model: LinearModel,
-    pub steady_state: SteadyState,
-    /// The terms it was built from, as documented.
-    pub noise: AxisParams,
-}
-
-/// A tuned filter: what `tune` writes and `replay`, `montecarlo` and `export` read.
-#[derive(Clone, Debug)]
-pub struct FilterDesign {
-    pub quantity: Quantity,
-    pub sample_rate_hz: f64,
-    /// "static", "angle", "rate", "vertical" or "custom".
-    pub plant: String,
-    /// The plant and its aids as documented; absent for a sensor at rest.
-    pub design: Option<Design>,
-    pub axes: Vec<AxisDesign>,
-    /// Free-form record of the tuning: method, objective, what moved and by how much.
-    pub tuning: Value,
-}
-
-#[derive(Clone, Debug, thiserror::Error)]
-pub enum FilterError {
-    #[error("{path}: cannot read: {reason}")]
-    Read { path: String, reason: String },
-    /// `key` is the path inside the document: `axes[0].P0`.
-    #[error("{path}: {key}: {message}")]
-    Invalid { path: String, key: String, message: String },
-    #[error("{path}: line {line}, column {column}: not valid JSON: {message}")]
-    Syntax { path: String, line: usize, column: usize, message: String },
-}
 
 impl FilterDesign {
     /// Reads filter.json and checks it; every complaint names `path` and the key.
@@ -89,9 +56,6 @@ impl FilterDesign {
         schemars::schema_for!(FilterDocument).to_value()
     }
 }
-
-/// Layout of filter.json.
-pub(super) const FORMAT: &str = "kfdesign-filter/1";
 
 #[derive(Serialize, JsonSchema)]
 enum Format {
@@ -251,6 +215,15 @@ fn rows_of(a: &DMatrix<f64>) -> Matrix {
 
 fn named(named: &Named) -> NamedDocument {
     NamedDocument { name: named.name.clone(), unit: named.unit.clone() }
+}
+
+impl JsonSchema for FilterDesign {
+    fn schema_name() -> Cow<'static, str> {
+        "FilterDesign".into()
+    }
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        FilterDocument::json_schema(generator)
+    }
 }
 
 impl From<&FilterDesign> for FilterDocument {

@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use super::constant_gain::ConstantGain;
-use super::document::AxisDesign;
+use super::design::AxisDesign;
 use super::kalman::{Kalman, Update};
 use super::square_root::SquareRoot;
 use crate::numerics::linalg::LinalgError;

@@ -5,7 +5,7 @@
 
 use pulp::{Arch, NullaryFnOnce};
 
-use super::kalman::{Measurement, Update};
+use super::measurement::{Measurement, Update};
 
 /// y ← y + a x.
 #[inline(always)]

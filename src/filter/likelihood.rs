@@ -8,8 +8,9 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::model::LinearModel;
-use bank::{BLOCK, Bank, Samples};
+use bank::{BLOCK, Bank};
 use lane::LANES;
+use settled::Samples;
 
 /// Consecutive samples of a log.
 #[derive(Clone, Copy, Debug)]

@@ -3,12 +3,15 @@
 use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
 
-use super::document::{AxisDesign, FORMAT, FilterDesign};
+use super::design::{AxisDesign, FilterDesign};
 use super::steady_state::{SteadyState, steady_state};
 use crate::model::{LinearModel, ModelError, Named, Output};
 use crate::params::place::{KeyError, Object, Place};
 use crate::params::{self, AxisParams, Design, Measured, PLANTS, Range};
 use crate::units::{Dimension, Quantity, Unit, digits};
+
+/// Layout of filter.json.
+const FORMAT: &str = "kfdesign-filter/1";
 
 /// A steady state whose gain differs by more than this, relative to the largest gain, belongs to another model.
 const GAIN_TOLERANCE: f64 = 1e-6;

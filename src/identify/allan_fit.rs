@@ -16,6 +16,7 @@ use super::{
 use crate::allan::{self, AllanCurve, Deviation, TauGrid};
 use crate::noise::{Kind, NoiseModel, Term};
 use crate::numerics::distribution::{NORMAL_90, NORMAL_95};
+use crate::numerics::optimize::{bisect, half_way};
 use crate::numerics::reduce::mean;
 use crate::params::{AxisParams, Measured, NotIdentified};
 use crate::units::{Unit, digits};
@@ -379,14 +380,12 @@ fn largest_tolerated(points: &Points, fit: &Fit, kind: Kind) -> Option<f64> {
     // where the term alone reaches the model's variance at the longest averaging time; far too much
     let longest = *points.factors().last()?;
     let unit = super::shape::one_coefficient(kind, 1.0).allan_variance(longest, points.dt());
-    let mut above = 0.5 * (fit.model().allan_variance(longest, points.dt()) / unit).ln() + 2.0;
-    let mut below = above - 5.0;
+    let above = 0.5 * (fit.model().allan_variance(longest, points.dt()) / unit).ln() + 2.0;
+    let below = above - 5.0;
     if excess(above)? < 0.0 || excess(below)? > 0.0 {
         return None;
     }
-    while above - below > 0.02 {
-        let middle = 0.5 * (above + below);
-        if excess(middle)? > 0.0 { above = middle } else { below = middle }
-    }
+    let past = |at| Ok::<_, ()>(excess(at).ok_or(())? > 0.0);
+    let (below, above) = bisect(below, above, half_way(0.02), past).ok()?;
     Some((0.5 * (above + below)).exp())
 }

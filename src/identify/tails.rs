@@ -21,14 +21,16 @@ use serde::Serialize;
 use super::{FEWEST_SAMPLES, Identified, Sum, counts_as_white};
 use crate::noise::{Grid, NoiseModel, Term};
 use crate::numerics::distribution::{NORMAL_95, normal_quantile};
+use crate::numerics::optimize::lowest;
 use crate::signal::cosine::{Inverse, cosine_transform};
 use crate::signal::upsets::FALSE_ALARM;
 use crate::units::digits;
 
 /// Samples that are whitened at once, about: drift that is slower is taken off with their mean.
 pub(super) const SEGMENT: usize = 1 << 14;
-/// Segments that tell the kurtosis, at most, evenly spread: of a million samples it is known to half a percent.
-pub(super) const MOST_SEGMENTS: usize = 64;
+/// Segments that tell the kurtosis, at most, evenly spread: a quarter of a million samples know it to 0.01 (√(24/n)),
+/// which is a quarter of a percent of an interval.
+pub(super) const MOST_SEGMENTS: usize = 16;
 /// Lengths of blocks, the longest as long as filters of sensors remember.
 const BLOCKS: [usize; 3] = [1, 8, 64];
 /// Fewest blocks whose variance says something.
@@ -320,9 +322,9 @@ impl Law {
             }
             whole.ln() - sum / count
         };
-        let around = (scale.ln() - 1.0, scale.ln() + 1.0);
-        let best_scale = |inverse: f64| lowest(around, |ln_scale| cost(ln_scale, inverse));
-        let inverse = lowest((0.0, HEAVIEST), |inverse| cost(best_scale(inverse), inverse));
+        let around = scale.ln();
+        let best_scale = |inverse: f64| lowest(|ln_scale| cost(ln_scale, inverse), around - 1.0, around + 1.0, 1e-7);
+        let inverse = lowest(|inverse| cost(best_scale(inverse), inverse), 0.0, HEAVIEST, 1e-7);
         let ln_scale = best_scale(inverse);
         let normal = cost(best_scale(0.0), 0.0);
         let here = cost(ln_scale, inverse);
@@ -369,23 +371,4 @@ impl Student {
             digits(self.factor)
         )
     }
-}
-
-/// Where a function with one minimum is lowest (golden section).
-fn lowest((mut low, mut high): (f64, f64), of: impl Fn(f64) -> f64) -> f64 {
-    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-    let (mut a, mut b) = (high - golden * (high - low), low + golden * (high - low));
-    let (mut at_a, mut at_b) = (of(a), of(b));
-    while high - low > 1e-7 {
-        if at_a < at_b {
-            (high, b, at_b) = (b, a, at_a);
-            a = high - golden * (high - low);
-            at_a = of(a);
-        } else {
-            (low, a, at_a) = (a, b, at_b);
-            b = low + golden * (high - low);
-            at_b = of(b);
-        }
-    }
-    0.5 * (low + high)
 }

@@ -19,7 +19,6 @@
 //! Source: Guerrier, Skaloud, Stebler & Victoria-Feser 2013 (JASA 108), equations 7 and 9.
 
 use nalgebra::{DMatrix, DVector};
-use slsqp::{Func, StopTols, minimize};
 use statrs::function::gamma::ln_gamma;
 
 use super::points::{Covariance, Distance, Points};
@@ -27,6 +26,7 @@ use super::shape::{Role, Shape, one_coefficient};
 use crate::noise::{Kind, NoiseModel, Term};
 use crate::numerics::distribution::chi_square_sf;
 use crate::numerics::linalg::cholesky;
+use crate::numerics::optimize::{Look, Optimum, Problem, minimize};
 
 /// The outcome for one model.
 #[derive(Clone, Debug)]
@@ -329,46 +329,29 @@ fn descend(
     start: &[f64],
     restarts: usize,
 ) -> Option<(Vec<f64>, f64)> {
-    let mut at: Vec<f64> = start.iter().zip(bounds).map(|(p, (lo, hi))| p.clamp(*lo, *hi)).collect();
-    let mut best = f64::INFINITY;
-    // the quasi-Newton steps are restarted with fresh scales until they gain nothing
-    for _ in 0..restarts {
-        let here = weights.look(points, shape, &at).residuals;
-        let scale: Vec<f64> =
-            (1..here.ncols()).map(|j| 1.0 / here.column(j).norm().clamp(1e-3, 1e6)).map(|s| s.min(1.0)).collect();
-        let unscale = |x: &[f64]| x.iter().zip(&scale).map(|(x, s)| x * s).collect::<Vec<f64>>();
-        let objective = |x: &[f64], gradient: Option<&mut [f64]>, _: &mut ()| {
-            let place = weights.look(points, shape, &unscale(x));
-            let first = place.residuals.column(0);
-            if let Some(gradient) = gradient {
-                for (j, g) in gradient.iter_mut().enumerate() {
-                    *g = scale[j] * (first.dot(&place.residuals.column(j + 1)) + place.lean_slope[j]);
-                }
-            }
-            let half = place.half();
-            if half.is_finite() { half } else { f64::MAX.sqrt() }
-        };
-        let x: Vec<f64> = at.iter().zip(&scale).map(|(p, s)| p / s).collect();
-        let limits: Vec<(f64, f64)> = bounds.iter().zip(&scale).map(|((lo, hi), s)| (lo / s, hi / s)).collect();
-        let no_constraints: [&dyn Func<()>; 0] = [];
-        let tolerances = StopTols { ftol_rel: 1e-9, ftol_abs: 1e-6, ..StopTols::default() };
-        let (x, value) = match minimize(objective, &x, &limits, &no_constraints, (), 300, Some(tolerances)) {
-            Ok((_, x, value)) | Err((_, x, value)) => (x, value),
-        };
-        let next = unscale(&x);
-        if !value.is_finite() || next.iter().any(|p| !p.is_finite()) {
-            break;
-        }
-        let gain = best - value;
-        if gain > 0.0 {
-            best = value;
-            at = next.iter().zip(bounds).map(|(p, (lo, hi))| p.clamp(*lo, *hi)).collect();
-        }
-        if gain.abs() < 1e-4 * (1.0 + 1e-3 * best) || gain < 0.0 {
-            break;
-        }
-    }
-    best.is_finite().then_some((at, best))
+    let look = |at: &[f64], _: &[f64], _: bool| {
+        let place = weights.look(points, shape, at);
+        let first = place.residuals.column(0);
+        let slope = |(j, lean): (usize, &f64)| first.dot(&place.residuals.column(j + 1)) + lean;
+        let slopes = vec![place.lean_slope.iter().enumerate().map(slope).collect()];
+        Look { values: vec![place.half()], slopes }
+    };
+    let scale = |at: &[f64], _| {
+        let here = weights.look(points, shape, at).residuals;
+        (1..here.ncols()).map(|j| (1.0 / here.column(j).norm().clamp(1e-3, 1e6)).min(1.0)).collect()
+    };
+    let problem = Problem {
+        look: &look,
+        scale: &scale,
+        f_rel: 1e-9,
+        evaluations: 300,
+        rounds: restarts,
+        worth: 1e-4,
+        worth_rel: 1e-7,
+        ..Problem::default()
+    };
+    let Optimum { x, f, .. } = minimize(&problem, start, bounds);
+    f.is_finite().then_some((x, f))
 }
 
 /// Fit a model to the points. None when there are too few points or the weights cannot be formed.

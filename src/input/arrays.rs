@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::account::Account;
 use super::names::{Head, is_rate, words};
 use super::number::{Split, since};
-use super::source::{Source, Topic};
+use super::table::{Source, Topic};
 use super::{BLOCK, InputError, Rows, Table};
 
 /// More columns than this are no channels of a log.

@@ -1,7 +1,6 @@
 //! The columns to read: axes, their units, and the time. What stays ambiguous is an error that lists what is there.
 
 use super::names::{Head, axis_at, is_excluded, sensor_of, time_rank, words};
-use super::temperature::Temperature;
 use crate::units::{Dimension, Quantity, Unit};
 
 use super::{AxisInfo, ExtraColumn, InputError, InputKind, LogOptions};
@@ -376,4 +375,18 @@ impl Table<'_> {
 /// The same factor and dimension, however it is spelled.
 pub(super) fn same(a: &Unit, b: &Unit) -> bool {
     a.dimension() == b.dimension() && (a.scale() - b.scale()).abs() <= 1e-9 * a.scale().abs()
+}
+
+/// What became of that.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Temperature {
+    pub(super) column: Option<(usize, AxisInfo)>,
+    /// Why a column that looks like a temperature is not read.
+    pub(super) note: Option<String>,
+}
+
+impl Temperature {
+    pub(super) fn passed_over(note: String) -> Temperature {
+        Temperature { column: None, note: Some(note) }
+    }
 }

@@ -17,7 +17,7 @@ use super::bytes::Bytes;
 use super::names::Head;
 use super::number::{Kind, Number, Split};
 use super::records::{Field, Messages, PassedOver, RecordSource, failure, head, instance, opened, tally};
-use super::source::Topic;
+use super::table::Topic;
 use batch::{Batch, Part};
 
 pub(super) const SIGNATURE: &[u8] = &[0xa3, 0x95, FORMAT];

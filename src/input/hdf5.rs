@@ -15,8 +15,9 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+use self::chunks::Dataset;
 use self::datatype::{Datatype, Element};
-use self::object::{Dataset, Object};
+use self::object::Object;
 use super::InputError;
 use super::account::{Account, JUMP, deeper};
 use super::arrays::{Array, ArrayFile, Put};

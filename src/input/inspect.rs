@@ -6,7 +6,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::names::Head;
-use super::source::{self, Topic};
+use super::source;
+use super::table::Topic;
 use super::{InputError, LogOptions, Rows, Table, columns};
 
 /// The tables of a file.

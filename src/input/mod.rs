@@ -20,6 +20,7 @@ mod rows;
 mod sniff;
 mod source;
 mod sqlite;
+mod table;
 mod temperature;
 mod text;
 mod ulog;
@@ -32,8 +33,8 @@ use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
 use self::columns::Choice;
-use self::names::Head;
 use self::rows::{Batch, Part, Rows, WORTHWHILE};
+use self::table::{BLOCK, Table};
 use crate::signal::check::{AxisRange, BackwardStamp, Checker, Finding, Outcome, TimeBase};
 use crate::signal::{Axis, Gap, LogCheck, Recording};
 use crate::units::{Dimension, Quantity, Unit, plain};
@@ -113,44 +114,6 @@ pub struct Block {
     pub missing: Vec<u64>,
     /// Seconds from the first sample of the log, per sample.
     pub time_s: Vec<f64>,
-}
-
-/// Rows a table hands out at a time.
-const BLOCK: usize = 4096;
-
-/// A file of columns, read from the beginning as often as needed.
-trait Table {
-    fn heads(&self) -> Vec<&Head>;
-    /// False when the columns have only numbers.
-    fn named(&self) -> bool;
-    /// File and place of the names, for messages.
-    fn place(&self) -> String;
-    fn row_place(&self, line: u64) -> String;
-    /// What of the file could not be read, after a pass.
-    fn notes(&self) -> Vec<String> {
-        Vec::new()
-    }
-    /// `beside`: a column behind the axes, in which text is a missing value.
-    fn select(&mut self, time: Option<usize>, axes: &[usize], beside: Option<usize>);
-    fn rewind(&mut self) -> Result<(), InputError>;
-    /// Number of rows, where it is known to be true.
-    fn rows(&self) -> Option<u64>;
-    /// So many rows, or a few more or less.
-    fn about(&self) -> Option<u64> {
-        self.rows()
-    }
-    /// Further rows cost nothing: they have been read.
-    fn at_hand(&self) -> bool {
-        false
-    }
-    /// The sample rate in Hz and what the file calls it, where it says it.
-    fn rate(&self) -> Option<(String, f64)> {
-        None
-    }
-    /// The first stamp of the file, in the file's unit.
-    fn origin(&self) -> f64;
-    /// Up to [`BLOCK`] further rows; false at the end.
-    fn next_rows(&mut self, rows: &mut Rows) -> Result<bool, InputError>;
 }
 
 /// The rows between `--start` and `--end`: from the first row at or after the start to the last before one beyond the end.

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::account::Account;
 use super::names::Head;
 use super::number::{Number, Split, since};
-use super::source::{Source, Topic};
+use super::table::{Source, Topic};
 use super::{BLOCK, InputError, Rows, Table};
 use crate::units::Unit;
 

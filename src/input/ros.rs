@@ -12,7 +12,7 @@ use super::bytes::{Bytes, Short, zstd};
 use super::names::Head;
 use super::number::Split;
 use super::records::{Messages, RecordSource, failure, head, tally};
-use super::source::Topic;
+use super::table::Topic;
 
 const MOST_TOPICS: usize = 10_000;
 

@@ -78,11 +78,9 @@ impl Choice {
         let beside = self.temperature.column.as_ref().map(|(_, info)| &info.unit);
         let units = self.stored.iter().chain(&self.extra).chain(beside);
         for (column, unit) in rows.values.iter_mut().zip(units) {
-            to_si(unit, column);
             // what no sensor gives would spoil every sum it enters
-            if column.iter().fold(false, |found, x| found | (x.abs() > LARGEST)) {
-                column.iter_mut().filter(|x| x.abs() > LARGEST).for_each(|x| *x = f64::INFINITY.copysign(*x));
-            }
+            let within = |x: f64| if x.abs() > LARGEST { f64::INFINITY.copysign(x) } else { x };
+            column.iter_mut().for_each(|x| *x = within(unit.to_si(*x)));
         }
         // 0 x is NaN for what is not finite
         let empty = stamped && by_eight(&rows.time, |t| 0.0 * t) != 0.0;

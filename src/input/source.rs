@@ -6,56 +6,12 @@ use std::path::{Path, PathBuf};
 
 use super::account::Account;
 use super::names::Head;
+use super::table::{Source, Topic};
 use super::{
     InputError, LogOptions, Table, arrays, columns, dataflash, hdf5, mat, mcap, npy, parquet, ros, rosbag, sqlite,
     text, ulog,
 };
 use crate::units::Quantity;
-
-/// One table of a file: a message of a flight log, a topic of a bag, arrays of one length; a text log is one.
-#[derive(Clone, Debug)]
-pub(super) struct Topic {
-    pub(super) name: String,
-    /// Other names by which `--topic` finds it.
-    pub(super) aliases: Vec<String>,
-    pub(super) heads: Vec<Head>,
-    /// False when the columns have only numbers.
-    pub(super) named: bool,
-    /// Of messages: their type; of an object: its class.
-    pub(super) kind: String,
-    /// An object of MATLAB, which cannot be read.
-    pub(super) object: bool,
-    /// Where the file says it, or the reader has counted.
-    pub(super) rows: Option<u64>,
-    /// First and last stamp, s, where the reader has counted.
-    pub(super) span_s: Option<(f64, f64)>,
-    /// Of several with the sensor that is looked for, the highest is taken: output of a sensor before what was made of it.
-    pub(super) rank: u8,
-}
-
-impl Topic {
-    pub(super) fn new(name: String, heads: Vec<Head>) -> Topic {
-        let (aliases, kind) = (Vec::new(), String::new());
-        Topic { name, aliases, heads, named: true, kind, object: false, rows: None, span_s: None, rank: 0 }
-    }
-}
-
-impl Topic {
-    /// What to say of an object.
-    pub(super) fn unread_object(&self) -> String {
-        let class = &self.kind;
-        format!("a MATLAB object of the class '{class}', which cannot be read; save what is in it as arrays of numbers")
-    }
-}
-
-/// An open file.
-pub(super) trait Source: Send {
-    /// "HDF5", "PX4 ULog".
-    fn format(&self) -> &'static str;
-    fn topics(&self) -> &[Topic];
-    /// Another topic each time.
-    fn table(&mut self, topic: usize) -> Result<Box<dyn Table + Send>, InputError>;
-}
 
 /// A file with one table.
 struct Single {

@@ -1,6 +1,6 @@
 //! The column with the temperature of the sensor: by its name or unit, or as a flag says it.
 
-use super::columns::{Table, same};
+use super::columns::{Table, Temperature, same};
 use super::names::{is_of, is_temperature, words};
 use super::{AxisInfo, InputError, LogOptions};
 use crate::signal::check::Finding;
@@ -16,20 +16,6 @@ pub enum TemperatureColumn {
     Found,
     /// `NAME`, `NAME:degC`, `3`, `3:degC`.
     Named(String),
-}
-
-/// What became of that.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Temperature {
-    pub(super) column: Option<(usize, AxisInfo)>,
-    /// Why a column that looks like a temperature is not read.
-    note: Option<String>,
-}
-
-impl Temperature {
-    fn passed_over(note: String) -> Temperature {
-        Temperature { column: None, note: Some(note) }
-    }
 }
 
 impl Table<'_> {

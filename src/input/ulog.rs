@@ -15,7 +15,7 @@ use super::bytes::Bytes;
 use super::names::Head;
 use super::number::{Kind, Number, Split};
 use super::records::{Field, Messages, PassedOver, RecordSource, failure, head, instance, opened, tally};
-use super::source::Topic;
+use super::table::Topic;
 
 pub(super) const SIGNATURE: &[u8] = b"ULog\x01\x12\x35";
 

@@ -1,13 +1,12 @@
 //! Replicates of the gate: they set its critical value and, with other random numbers, measure its false-alarm probability.
 
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 use super::conclusion;
 use super::engine::Course;
 use super::gate::{AxisGate, Gate, Kind, Raw};
 use super::law::Law;
+use super::outcome::{Caught, FalseAlarmRate, Method, TestRate};
 use crate::numerics::distribution::normal_quantile;
 
 /// Replicates drawn for the critical value: a family-wise alpha of 0.01 is then met within 5 % of itself (one standard deviation).
@@ -18,42 +17,6 @@ const MEASURED: u64 = 20_000;
 pub const MAX_RUN: u64 = 1 << 40;
 /// Most whole experiments that can be asked for: their run numbers stay below 2⁶⁰.
 pub const MAX_REPLICATES: u64 = 1_000_000;
-
-/// How often the gate rejects a true filter.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct FalseAlarmRate {
-    /// Share of the replicates that were called inconsistent.
-    pub value: f64,
-    /// 95 % interval of the probability (Wilson 1927).
-    pub interval: [f64; 2],
-    pub replicates: u64,
-    pub method: Method,
-    /// Each test alone at level alpha.
-    pub tests: Vec<TestRate>,
-}
-
-/// How replicates were made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Method {
-    /// The statistics are drawn from their law for a true filter.
-    Law,
-    /// Every replicate is a whole experiment with the design as its own truth.
-    Experiments,
-}
-
-/// False alarms of one test.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct TestRate {
-    pub axis: String,
-    pub name: String,
-    /// Share of the replicates in which this test alone would reject at level alpha.
-    pub value: f64,
-    /// Share in which its p-value was at or below the critical one.
-    pub rejected: f64,
-}
 
 /// Interval of a probability after `hits` of `trials`: Wilson's score interval.
 pub fn wilson(hits: u64, trials: u64, confidence: f64) -> [f64; 2] {
@@ -105,14 +68,6 @@ fn whole_experiment(course: &Course, runs: u64, number: u64, progress: &(dyn Fn(
     let first = MAX_RUN + number * runs.next_multiple_of(4);
     let totals = course.sums(first..first + runs, progress);
     course.axes.iter().zip(&totals).map(|(axis, totals)| conclusion::raw_p_values(axis, totals, runs)).collect()
-}
-
-/// How often a wrong filter was caught.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Caught {
-    pub caught: u64,
-    pub of: u64,
 }
 
 /// Whole experiments: how often some test of some axis has a p-value of at most `critical`; `gates`: one per axis of `course`.

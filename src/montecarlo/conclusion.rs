@@ -1,10 +1,11 @@
 //! From the sums over runs to tests, curves and sentences.
 
-use super::course::{AxisCourse, Channel};
+use super::course::AxisCourse;
 use super::gate::{AxisGate, Gate, Kind, Raw, periodogram_distance};
 use super::outcome::{
     AxisOutcome, Component, Credibility, Histogram, Innovations, LowFrequency, NeesAverage, NeesCurve, Periodogram,
 };
+use super::sums::Channel;
 use super::sums::{NIS_BIN, NIS_BINS, Totals};
 use super::{credibility, sentences};
 use crate::consistency::Test;

@@ -5,9 +5,8 @@ use std::sync::OnceLock;
 use nalgebra::DMatrix;
 
 use super::MonteCarloError;
-use super::lanes::Truth;
-use super::sums::Layout;
-use crate::consistency::low_frequency::{block_lengths, time_constants};
+use super::sums::{Channel, Layout};
+use crate::consistency::low_frequency::time_constants;
 use crate::filter::gains::Epoch;
 use crate::filter::{AxisDesign, FilterDesign, GainSequence, Judge};
 use crate::model::LinearModel;
@@ -15,18 +14,8 @@ use crate::numerics::linalg::{cholesky_semidefinite, symmetrise};
 use crate::numerics::quadratic_form::QuadraticForm;
 use crate::tune::{TuneOptions, sensor_model};
 
-use super::spread::Spread;
-
 /// Times, evenly spread over a run, at which errors are judged; the time average of the NEES is over these.
 const REGULAR_EPOCHS: u64 = 100;
-/// Lags of the autocorrelation, at most.
-const LAGS: u64 = 20;
-/// Series of block means that the cumulative periodogram looks at have at least and at most this many points.
-const BLOCKS: [u64; 2] = [32, 1024];
-/// Each block length of the low-frequency test is this many times the one before.
-const LENGTH_RATIO: u64 = 4;
-/// Block lengths go up to this many times the longest time constant of the filter.
-const LONGEST_BLOCK: f64 = 16.0;
 /// More steps would need more memory for the gains than a small machine has.
 pub const MAX_STEPS: u64 = 10_000_000;
 /// Fewer steps leave no room for blocks and epochs.
@@ -48,10 +37,9 @@ pub struct AxisCourse {
     /// In the order of `gains.epochs`.
     pub epochs: Vec<EpochCourse>,
     pub channels: Vec<Channel>,
-    pub(super) nominal: Truth,
-    pub(super) spread: Option<Spread>,
     pub(super) layout: Layout,
-    nees_over_time: OnceLock<QuadraticForm>,
+    /// Law of the NEES summed over the evenly spread epochs; the gate fills it in when it first asks.
+    pub(super) over_time: OnceLock<QuadraticForm>,
 }
 
 /// How errors at one epoch are judged.
@@ -69,69 +57,9 @@ pub struct EpochCourse {
     pub sigma: Vec<f64>,
 }
 
-/// One measurement of an axis and how its innovations are summed up.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Channel {
-    pub name: String,
-    /// Taken at every n-th step.
-    pub every: u64,
-    /// Updates in a run.
-    pub updates: u64,
-    /// Lags 1..=lags of the autocorrelation.
-    pub lags: usize,
-    /// Updates in a base block.
-    pub base: u64,
-    /// Complete base blocks in a run.
-    pub blocks: usize,
-    /// Block lengths of the low-frequency test, in base blocks.
-    pub lengths: Vec<usize>,
-    /// Frequencies of the cumulative periodogram of the base blocks, without zero and Nyquist; 0 when there are too few.
-    pub ordinates: usize,
-}
-
-impl Channel {
-    fn new(name: &str, every: u64, steps: u64, time_constants: &[f64]) -> Channel {
-        let updates = steps.div_ceil(every);
-        let own: Vec<f64> = time_constants.iter().map(|t| t / every as f64).collect();
-        let least = updates.div_ceil(BLOCKS[1]);
-        let most = (updates / BLOCKS[0]).max(1);
-        let base = block_lengths(&own).first().copied().unwrap_or(1).clamp(least.min(most), most);
-        let longest = own.iter().copied().fold(0.0, f64::max) * LONGEST_BLOCK;
-        let longest = if longest > 0.0 { longest } else { f64::INFINITY };
-        let blocks = updates / base;
-        let lengths = std::iter::successors(Some(1), |length| Some(length * LENGTH_RATIO))
-            .take_while(|length| *length <= blocks && (*length == 1 || (length * base) as f64 <= longest))
-            // single updates are what the NIS judges
-            .filter(|length| length * base > 1)
-            .map(|length| length as usize)
-            .collect();
-        let ordinates = (blocks as usize - 1) / 2;
-        Channel {
-            name: name.into(),
-            every,
-            updates,
-            lags: LAGS.min(updates / 10).max(1) as usize,
-            base,
-            blocks: blocks as usize,
-            lengths,
-            ordinates: if ordinates < 8 { 0 } else { ordinates },
-        }
-    }
-
-    /// Complete blocks of `length` base blocks in a run.
-    pub fn blocks_of(&self, length: usize) -> usize {
-        self.blocks / length
-    }
-}
-
 impl AxisCourse {
-    /// `truth`: the model that is simulated; with `spread`, another one for every run.
-    pub(super) fn new(
-        design: &AxisDesign,
-        truth: LinearModel,
-        spread: Option<Spread>,
-        steps: u64,
-    ) -> Result<AxisCourse, MonteCarloError> {
+    /// `truth`: the model that is simulated.
+    pub(super) fn new(design: &AxisDesign, truth: LinearModel, steps: u64) -> Result<AxisCourse, MonteCarloError> {
         let filter = design.model.clone();
         let described = |m: &LinearModel| {
             let every: Vec<String> =
@@ -167,7 +95,6 @@ impl AxisCourse {
         let failed = |what, source| MonteCarloError::Truth { axis: design.name.clone(), what, source };
         cholesky_semidefinite(&truth.p0).map_err(|e| failed("P0", e))?;
         cholesky_semidefinite(&truth.q).map_err(|e| failed("Q", e))?;
-        let nominal = Truth::of_one(&truth);
         let layout = Layout::new(gains.epochs.len(), judge.size(), &channels);
         Ok(AxisCourse {
             name: design.name.clone(),
@@ -178,20 +105,9 @@ impl AxisCourse {
             judge,
             epochs,
             channels,
-            nominal,
-            spread,
             layout,
-            nees_over_time: OnceLock::new(),
+            over_time: OnceLock::new(),
         })
-    }
-
-    pub(super) fn layout(&self) -> &Layout {
-        &self.layout
-    }
-
-    /// Law of the NEES summed over the evenly spread epochs of a run; computed when first asked for.
-    pub(super) fn nees_over_time(&self) -> &QuadraticForm {
-        self.nees_over_time.get_or_init(|| super::gate::nees_over_time(self))
     }
 }
 

@@ -170,7 +170,7 @@ impl Shard {
             return Err(wrong(format!("found {} axes, expected {}", self.sums.len(), course.axes.len())));
         }
         let one = |((values, counts), axis): (&(Vec<Vec<f64>>, Vec<u64>), &AxisCourse)| {
-            let fresh = Totals::new(axis.layout());
+            let fresh = Totals::new(&axis.layout);
             if values.len() != fresh.values.len() || counts.len() != fresh.counts.len() {
                 return Err(wrong(format!(
                     "axis '{}': found {} values and {} counts, expected {} and {}",
@@ -209,7 +209,7 @@ impl Shard {
 ///
 /// Sums that are not finite are those of a truth that runs away; nothing is said about them.
 fn impossible(totals: &Totals, axis: &AxisCourse, runs: u64) -> Option<String> {
-    let layout = axis.layout();
+    let layout = &axis.layout;
     // sums of a run are rounded before they are added up
     let larger = |a: f64, b: f64| a > b + 1e-9 * b.abs();
     for epoch in 0..axis.epochs.len() {

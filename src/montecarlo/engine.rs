@@ -3,11 +3,15 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
+use pulp::Arch;
 use rayon::prelude::*;
 
-use super::course::AxisCourse;
-use super::lanes::{LANES, Lane, Observer, Runs, Scratch, Truth, simulate};
-use super::sums::Totals;
+use super::course::{AxisCourse, EpochCourse};
+use super::kernels::{Absorb, Stretch};
+use super::lanes::{CHUNK, LANES, Lane, Truth};
+use super::scratch::{ChannelSums, Observer, Runs, Scratch};
+use super::spread::Spread;
+use super::sums::{Layout, NIS_BINS, Totals};
 
 /// Steps (of all runs and axes) between two looks at the clock and at a request to stop.
 const BATCH_STEPS: u64 = 20_000_000;
@@ -19,9 +23,18 @@ pub struct Course {
     pub steps: u64,
     pub seed: u64,
     pub dt: f64,
+    /// The truths at their nominal parameters, and where every run has its own, how it is drawn.
+    nominal: Vec<Truth>,
+    spreads: Vec<Option<Spread>>,
 }
 
 impl Course {
+    /// `spreads`: one per axis.
+    pub(super) fn new(axes: Vec<AxisCourse>, spreads: Vec<Option<Spread>>, steps: u64, seed: u64, dt: f64) -> Course {
+        let nominal = axes.iter().map(|axis| Truth::of_one(&axis.truth)).collect();
+        Course { axes, steps, seed, dt, nominal, spreads }
+    }
+
     /// Sums over `runs`, one per axis. `progress` is called with the number of runs just finished (all axes).
     ///
     /// Every random number is addressed by (seed, run, axis, source) and the sums are exact: any number of threads, any cut into ranges
@@ -73,14 +86,14 @@ impl Course {
 
     fn start(&self, number: u32, runs: [u64; LANES], scratch: &mut Scratch) -> Runs<'_> {
         let axis = &self.axes[number as usize];
-        let model = self.drawn(number, runs).map_or(Cow::Borrowed(&axis.nominal), Cow::Owned);
+        let model = self.drawn(number, runs).map_or(Cow::Borrowed(&self.nominal[number as usize]), Cow::Owned);
         Runs::new(axis, number, model, self.seed, runs, scratch)
     }
 
     /// The truths of these runs, where every run has its own.
     fn drawn(&self, number: u32, runs: [u64; LANES]) -> Option<Truth> {
         let axis = &self.axes[number as usize];
-        let spread = axis.spread.as_ref()?;
+        let spread = self.spreads[number as usize].as_ref()?;
         let models = runs.map(|run| spread.draw(self.seed, run, number, &axis.truth));
         Some(Truth::of(models.each_ref()))
     }
@@ -202,6 +215,73 @@ impl Observer for Trace {
         let done = step as usize + 1;
         for column in [&mut self.measured, &mut self.innovation, &mut self.normalised].into_iter().flatten() {
             column.resize(done, f64::NAN);
+        }
+    }
+}
+
+/// Runs `runs` through the axis; results are in `scratch.values` and `scratch.counts`, one lane per run.
+///
+/// A run: x(0) ~ N(x0, P0), then z = H x + v, update with the gain of that step, x ← F x + w, and so on. The inner
+/// loops are compiled for each instruction set; operations and their order are the same in all, and so are the bits.
+fn simulate(axis: &AxisCourse, mut runs: Runs, scratch: &mut Scratch, mut observer: Option<&mut dyn Observer>) {
+    let arch = Arch::new();
+    scratch.channels.iter_mut().for_each(ChannelSums::start);
+    scratch.counts.iter_mut().for_each(|counts| counts.fill(0));
+    let mut step = 0;
+    let mut epochs = axis.epochs.iter().enumerate().peekable();
+    while step < axis.gains.steps {
+        runs.draw(scratch);
+        let end = (step + CHUNK as u64).min(axis.gains.steps);
+        while step < end {
+            // up to the next epoch, whose errors are judged
+            let stop = epochs.peek().map_or(end, |(_, epoch)| (epoch.step + 1).min(end));
+            let observer = observer.as_mut().map(|observer| &mut **observer as &mut dyn Observer);
+            arch.dispatch(Stretch { axis, runs: &mut runs, scratch, observer, step, stop });
+            step = stop;
+            if let Some((i, epoch)) = epochs.next_if(|(_, epoch)| epoch.step + 1 == stop) {
+                judge(epoch, i, &axis.layout, &runs, scratch);
+            }
+        }
+        for (c, (sums, channel)) in scratch.channels.iter_mut().zip(&axis.channels).enumerate() {
+            let place = axis.layout.histogram(c);
+            let histogram = scratch.counts.each_mut().map(|counts| &mut counts[place..=place + NIS_BINS]);
+            arch.dispatch(Absorb { sums, base: channel.base, histogram });
+        }
+    }
+    for (c, (sums, channel)) in scratch.channels.iter_mut().zip(&axis.channels).enumerate() {
+        sums.finish(channel, c, &axis.layout, &mut scratch.values);
+    }
+}
+
+/// The errors at an epoch.
+fn judge(epoch: &EpochCourse, number: usize, layout: &Layout, runs: &Runs, scratch: &mut Scratch) {
+    let (Runs { truth, estimate, .. }, Scratch { values, counts, .. }) = (runs, scratch);
+    let size = epoch.sigma.len();
+    for l in 0..LANES {
+        let (place, mean, moments) = (layout.epoch(number), layout.mean(number), layout.moments(number));
+        let values = &mut values[l];
+        let mut nees = 0.0;
+        for i in 0..size {
+            let known: f64 = truth.iter().enumerate().map(|(j, x)| epoch.of_truth[(i, j)] * x[l]).sum();
+            let found: f64 = estimate.iter().enumerate().map(|(j, x)| epoch.of_estimate[(i, j)] * x[l]).sum();
+            let u = known - found;
+            values[mean + i] = u;
+            nees += u * u;
+        }
+        values[place] = nees.log10();
+        let mut at = moments;
+        for i in 0..size {
+            for j in 0..=i {
+                values[at] = values[mean + i] * values[mean + j];
+                at += 1;
+            }
+        }
+        for i in 0..size {
+            let error: f64 = (0..=i).map(|j| epoch.root[(i, j)] * values[mean + j]).sum();
+            let ratio = error.abs() / epoch.sigma[i];
+            for (sigmas, count) in (1..=3).zip(&mut counts[l][layout.within(number, i)..][..3]) {
+                *count += u32::from(ratio <= f64::from(sigmas));
+            }
         }
     }
 }

@@ -6,10 +6,12 @@ use std::sync::Arc;
 use pulp::Arch;
 use rayon::prelude::*;
 
-use super::course::{AxisCourse, Channel};
+use super::course::AxisCourse;
 use super::engine::Course;
 use super::kernels::{AddSquares, Stretch};
-use super::lanes::{Aligned, CHUNK, ChannelSums, LANES, Lane, Scratch};
+use super::lanes::{Aligned, CHUNK, LANES, Lane};
+use super::scratch::{ChannelSums, Judged, Scratch, Whitening};
+use super::sums::Channel;
 use crate::filter::Kalman;
 use crate::filter::judge::Judge;
 use crate::numerics::distribution::chi_square_quantile;
@@ -41,28 +43,6 @@ impl EveryStep {
         let degrees = (self.runs * components as u64) as f64;
         [0.5 * alpha, 1.0 - 0.5 * alpha].map(|p| chi_square_quantile(p, degrees) / degrees)
     }
-}
-
-/// What the inner loop needs to judge errors at every step, and what it adds up.
-pub(super) struct Judged {
-    whiten: Arc<Whitening>,
-    components: usize,
-    /// Of the steps of a chunk, each lane: Σ over the runs that have taken it.
-    nees: Aligned,
-    /// The same of ν²/S, by measurements, at those steps that have it.
-    nis: Vec<Aligned>,
-    /// 1 for the lanes that are runs, 0 for those beyond the last.
-    used: Lane,
-    /// Σ over the runs so far, by steps.
-    nees_sum: Vec<f64>,
-    nis_sum: Vec<Vec<f64>>,
-}
-
-/// W A and W B by rows, step after step, with W the whitening of the claimed covariance of e = A x − B x̂.
-struct Whitening {
-    of_truth: Vec<f64>,
-    /// Empty where A = B.
-    of_estimate: Vec<f64>,
 }
 
 fn whitening(axis: &AxisCourse) -> Whitening {
@@ -139,36 +119,6 @@ impl Judged {
         }
     }
 
-    /// Rows of W A and W B (none where A = B) of `count` steps from `first` on, where both have `N` states; where their NEES is added, and the
-    /// lanes that count.
-    #[inline(always)]
-    pub(super) fn of<const N: usize>(&mut self, first: usize, count: usize) -> ([&[[f64; N]]; 2], &mut [Lane], Lane) {
-        let rows = first * self.components..(first + count) * self.components;
-        let of_truth = &self.whiten.of_truth.as_chunks().0[rows.clone()];
-        let of_estimate = self.whiten.of_estimate.as_chunks().0.get(rows).unwrap_or_default();
-        ([of_truth, of_estimate], &mut self.nees.lanes_mut()[first % CHUNK..][..count], self.used)
-    }
-
-    /// Adds the NEES of a step.
-    #[inline(always)]
-    pub(super) fn errors(&mut self, step: usize, truth: &[Lane], estimate: &[Lane]) {
-        let Whitening { of_truth, of_estimate } = &*self.whiten;
-        let of_estimate = if of_estimate.is_empty() { of_truth } else { of_estimate };
-        let mut nees = [0.0; LANES];
-        for row in step * self.components..(step + 1) * self.components {
-            let of_truth = product(&of_truth[row * truth.len()..], truth);
-            let of_estimate = product(&of_estimate[row * estimate.len()..], estimate);
-            for l in 0..LANES {
-                let u = of_truth[l] - of_estimate[l];
-                nees[l] += u * u;
-            }
-        }
-        let sum = &mut self.nees.lanes_mut()[step % CHUNK];
-        for l in 0..LANES {
-            sum[l] += nees[l] * self.used[l];
-        }
-    }
-
     /// Adds the squares of the fresh normalised innovations of every measurement.
     fn absorb(&mut self, channels: &mut [ChannelSums]) {
         for (sums, channel) in self.nis.iter_mut().zip(channels) {
@@ -196,18 +146,6 @@ impl Judged {
         self.nees_sum.fill(0.0);
         self.nis_sum.iter_mut().for_each(|nis| nis.fill(0.0));
     }
-}
-
-/// Σ a x.
-#[inline(always)]
-fn product(a: &[f64], x: &[Lane]) -> Lane {
-    let mut sum = [0.0; LANES];
-    for (a, x) in a.iter().zip(x) {
-        for l in 0..LANES {
-            sum[l] += a * x[l];
-        }
-    }
-    sum
 }
 
 /// By halves.

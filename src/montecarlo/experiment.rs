@@ -40,16 +40,16 @@ impl Experiment {
             return Err(MonteCarloError::Plan { name: "replicates", value, expected });
         }
         let truths = self.truths()?;
-        let mut axes = Vec::with_capacity(truths.len());
+        let (mut axes, mut spreads) = (Vec::with_capacity(truths.len()), Vec::with_capacity(truths.len()));
         for (design, truth) in self.design.axes.iter().zip(truths) {
             let model = match &self.truth {
                 Some(_) => model_of(truth, &self.design)?,
                 None => design.model.clone(),
             };
-            let spread = self.truth_spread.then(|| Spread::new(truth, &self.design)).transpose()?;
-            axes.push(AxisCourse::new(design, model, spread, self.steps)?);
+            spreads.push(self.truth_spread.then(|| Spread::new(truth, &self.design)).transpose()?);
+            axes.push(AxisCourse::new(design, model, self.steps)?);
         }
-        Ok(Course { axes, steps: self.steps, seed: self.seed, dt: 1.0 / self.design.sample_rate_hz })
+        Ok(Course::new(axes, spreads, self.steps, self.seed, 1.0 / self.design.sample_rate_hz))
     }
 
     /// The same with the design as its own truth.
@@ -147,8 +147,10 @@ pub(super) fn course_of(
     steps: u64,
     seed: u64,
 ) -> Result<Course, MonteCarloError> {
-    let axes = design.axes.iter().zip(truths).map(|(design, truth)| AxisCourse::new(design, truth, None, steps));
-    Ok(Course { axes: axes.collect::<Result<_, _>>()?, steps, seed, dt: 1.0 / design.sample_rate_hz })
+    let axes = design.axes.iter().zip(truths).map(|(design, truth)| AxisCourse::new(design, truth, steps));
+    let axes: Vec<AxisCourse> = axes.collect::<Result<_, _>>()?;
+    let spreads = vec![None; axes.len()];
+    Ok(Course::new(axes, spreads, steps, seed, 1.0 / design.sample_rate_hz))
 }
 
 /// Whether a plan makes sense.

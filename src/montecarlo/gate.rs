@@ -10,10 +10,12 @@ use std::fmt;
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
-use super::course::{AxisCourse, Channel};
+use super::course::AxisCourse;
+use super::sums::Channel;
 use crate::consistency::normalized::two_sided_p;
 use crate::numerics::distribution::{chi_square_sf, kolmogorov_sf, normal_quantile, normal_sf};
 use crate::numerics::linalg::symmetric_eigenvalues;
+use crate::numerics::optimize::bracketed_root;
 use crate::numerics::quadratic_form::QuadraticForm;
 
 /// Of so many judged components all are looked at together.
@@ -114,7 +116,7 @@ pub struct Raw<'a> {
 
 impl<'a> Raw<'a> {
     pub fn new(axis: &'a AxisCourse, runs: u64) -> Raw<'a> {
-        Raw { axis, runs, over_time: axis.nees_over_time() }
+        Raw { axis, runs, over_time: nees_over_time(axis) }
     }
 
     /// Independent NEES values that the average over the evenly spread epochs of one run is worth: E² r / Σ_jk |ρ_jk|².
@@ -207,7 +209,11 @@ pub fn periodogram_distance(ordinates: &[f64]) -> (f64, usize) {
 
 /// Law of the NEES summed over the evenly spread epochs of a run of a true filter: its weights are the eigenvalues of the correlation
 /// matrix of the whitened errors of all these epochs, blocks ρ_jk = E(u_j u_kᵀ).
-pub(super) fn nees_over_time(axis: &AxisCourse) -> QuadraticForm {
+pub(super) fn nees_over_time(axis: &AxisCourse) -> &QuadraticForm {
+    axis.over_time.get_or_init(|| law_over_time(axis))
+}
+
+fn law_over_time(axis: &AxisCourse) -> QuadraticForm {
     let size = axis.judge.size();
     // evenly spread epochs follow those of the start
     let first = axis.epochs.iter().position(|epoch| epoch.regular).unwrap_or(axis.epochs.len());
@@ -327,19 +333,13 @@ impl LeastLaw {
 
     /// t with P(p_min ≤ t) = `p`.
     pub fn quantile(&self, p: f64) -> f64 {
-        let (mut low, mut high) = (0.0, 1.0);
-        for _ in 0..200 {
-            let middle = 0.5 * (low + high);
-            if self.cdf(middle) < p {
-                low = middle
-            } else {
-                high = middle
-            }
-            if high - low <= 1e-14 * high {
-                break;
-            }
+        if p <= self.share || self.drawn.is_empty() {
+            return (self.tail * (p / self.share).powf(1.0 / self.power)).min(1.0);
         }
-        high
+        let place = p * self.drawn.len() as f64 - 0.5;
+        let (low, last) = (place as usize, self.drawn.len() - 1);
+        let (low, high, part) = (self.drawn[low.min(last)], self.drawn[(low + 1).min(last)], place.fract());
+        low + part * (high - low)
     }
 }
 
@@ -395,12 +395,7 @@ pub struct Gate {
 impl Gate {
     pub(super) fn new(axes: Vec<AxisGate>, alpha: f64) -> Gate {
         let mut gate = Gate { axes, alpha, critical: 0.0 };
-        let (mut low, mut high) = (0.0, 1.0);
-        for _ in 0..200 {
-            let middle = 0.5 * (low + high);
-            if gate.family(middle) < alpha { low = middle } else { high = middle }
-        }
-        gate.critical = low;
+        gate.critical = bracketed_root(|p| gate.family(p) - alpha, 0.0, 1.0, 0.0).unwrap_or(0.0);
         gate
     }
 

@@ -1,14 +1,14 @@
-//! The inner loops of [`lanes`](super::lanes), compiled for each instruction set and chosen at run time.
+//! The inner loops of the [`engine`](super::engine), compiled for each instruction set and chosen at run time.
 //!
 //! Every lane goes through the same operations in the same order whatever the width of the instructions, so the bits are the same too; a
 //! product and a sum are never fused. A lane of eight numbers is `pieces` registers.
 
-use pulp::{NullaryFnOnce, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 
 use super::course::AxisCourse;
-use super::lanes::{CHUNK, ChannelSums, LANES, Lane, Observer, Runs, Scratch, Transition, Truth};
+use super::lanes::{CHUNK, LANES, Lane, Transition, Truth};
+use super::scratch::{ChannelSums, Observer, Runs, Scratch};
 use super::sums::{NIS_BIN, NIS_BINS};
-use crate::numerics::normals::Normals;
 
 /// Registers of a list of lanes, `pieces` each.
 #[inline(always)]
@@ -32,21 +32,6 @@ fn pieces<S: Simd>() -> usize {
 fn add_product<S: Simd>(simd: S, x: &mut [S::f64s], a: &[S::f64s], b: &[S::f64s]) {
     for ((x, a), b) in x.iter_mut().zip(a).zip(b) {
         *x = simd.add_f64s(*x, simd.mul_f64s(*a, *b));
-    }
-}
-
-/// Fresh numbers of a source of noise.
-pub(super) struct Draw<'a> {
-    pub(super) normals: &'a mut Normals<LANES>,
-    pub(super) words: &'a mut [[u64; LANES]],
-    pub(super) numbers: &'a mut [Lane],
-}
-
-impl NullaryFnOnce for Draw<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn call(self) {
-        self.normals.fill(self.words, self.numbers);
     }
 }
 

@@ -15,8 +15,9 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{ChiSquared, Distribution, Gamma};
 
-use super::course::{AxisCourse, Channel};
+use super::course::AxisCourse;
 use super::gate::{Kind, Raw};
+use super::sums::Channel;
 use crate::numerics::distribution::normal_sf;
 use crate::numerics::random::{StreamId, fill_normal, normal, stream};
 
@@ -358,7 +359,7 @@ mod tests {
         // the first epochs are closer together
         let followed: Vec<usize> = law.links.iter().skip(8).map(|link| link.size).collect();
         assert!(followed.iter().all(|size| (1..=4).contains(size)), "{followed:?}");
-        let form = axis.nees_over_time();
+        let form = super::super::gate::nees_over_time(axis);
         let (size, epochs) = (axis.judge.size() as f64, axis.epochs.iter().filter(|e| e.regular).count() as f64);
         let (mut average, mut square, mut error) = (0.0, 0.0, 0.0);
         for replicate in 0..draws {

@@ -21,6 +21,7 @@ mod lanes;
 mod law;
 pub mod outcome;
 pub mod power;
+mod scratch;
 mod sentences;
 mod spread;
 pub mod sums;

@@ -1,10 +1,8 @@
 //! What an experiment says: the verdict document.
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use super::calibration::FalseAlarmRate;
-use super::power::{Detectable, Rejection};
 use crate::consistency::{Test, Verdict};
 
 /// Runs `first`, `first` + 1, …, `end` − 1.
@@ -161,4 +159,93 @@ pub struct Histogram {
     pub observed: Vec<f64>,
     /// χ² with one degree of freedom.
     pub expected: Vec<f64>,
+}
+
+/// How often the gate rejects a true filter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FalseAlarmRate {
+    /// Share of the replicates that were called inconsistent.
+    pub value: f64,
+    /// 95 % interval of the probability (Wilson 1927).
+    pub interval: [f64; 2],
+    pub replicates: u64,
+    pub method: Method,
+    /// Each test alone at level alpha.
+    pub tests: Vec<TestRate>,
+}
+
+/// How replicates were made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// The statistics are drawn from their law for a true filter.
+    Law,
+    /// Every replicate is a whole experiment with the design as its own truth.
+    Experiments,
+}
+
+/// False alarms of one test.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TestRate {
+    pub axis: String,
+    pub name: String,
+    /// Share of the replicates in which this test alone would reject at level alpha.
+    pub value: f64,
+    /// Share in which its p-value was at or below the critical one.
+    pub rejected: f64,
+}
+
+/// How often a wrong filter was caught.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Caught {
+    pub caught: u64,
+    pub of: u64,
+}
+
+/// The smallest size of one mistuning that the gate sees with 90 % probability.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Detectable {
+    pub axis: String,
+    /// `gauss_markov.std_dev`, `P0 of bias` (its root), `x0 of bias`.
+    pub parameter: String,
+    pub measure: Measure,
+    /// The filter's value is this many times the true one, more than 1; absent when no factor up to 1000 is seen. Of
+    /// x0: in sigmas.
+    pub too_large: Option<Sighting>,
+    /// The filter's value is this many times the true one, less than 1.
+    pub too_small: Option<Sighting>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Measure {
+    /// The filter's value over the true one.
+    Factor,
+    /// The filter's x0 minus the true mean, in sigmas of the claimed P0.
+    Sigmas,
+}
+
+/// A size that is seen, and by which test.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Sighting {
+    pub size: f64,
+    pub test: String,
+    /// By simulation, where it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub confirmed: Option<Caught>,
+}
+
+/// How surely the gate rejects the truth that was given.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Rejection {
+    /// Predicted probability, that of the most powerful test: at least this.
+    pub probability: f64,
+    pub axis: String,
+    pub test: String,
+    /// By simulation, where it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub confirmed: Option<Caught>,
 }

@@ -6,19 +6,19 @@
 //! gate rejects is at least that of its most powerful test, which is what is given.
 
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::Serialize;
 
 use super::MonteCarloError;
-use super::calibration::{Caught, caught_of_experiments};
+use super::calibration::caught_of_experiments;
 use super::conclusion::test_name;
 use super::course::{AxisCourse, model_in, model_of};
 use super::engine::Course;
 use super::experiment::Experiment;
 use super::gate::{AxisGate, Gate, Kind, Raw};
+use super::outcome::{Detectable, Measure, Rejection, Sighting};
 use crate::filter::mismatch::{Expectation, ExpectedError, expect};
 use crate::model::LinearModel;
 use crate::numerics::distribution::{chi_square_cdf, chi_square_quantile, chi_square_sf, normal_quantile, normal_sf};
+use crate::numerics::optimize::bisect;
 
 /// Probability with which a mistuning counts as seen.
 pub const WISHED: f64 = 0.9;
@@ -40,38 +40,6 @@ pub enum Mistuning {
     P0(usize),
     /// x0 of this state. Sizes are in sigmas of its P0.
     X0(usize),
-}
-
-/// The smallest size of one mistuning that the gate sees with 90 % probability.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Detectable {
-    pub axis: String,
-    /// `gauss_markov.std_dev`, `P0 of bias` (its root), `x0 of bias`.
-    pub parameter: String,
-    pub measure: Measure,
-    /// The filter's value is this many times the true one, more than 1; absent when no factor up to 1000 is seen. Of x0: in sigmas.
-    pub too_large: Option<Sighting>,
-    /// The filter's value is this many times the true one, less than 1.
-    pub too_small: Option<Sighting>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Measure {
-    /// The filter's value over the true one.
-    Factor,
-    /// The filter's x0 minus the true mean, in sigmas of the claimed P0.
-    Sigmas,
-}
-
-/// A size that is seen, and by which test.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Sighting {
-    pub size: f64,
-    pub test: String,
-    /// By simulation, where it was asked for.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub confirmed: Option<Caught>,
 }
 
 /// Probability that the gate rejects, at least, and the test that does.
@@ -179,7 +147,7 @@ impl<'a> Instrument<'a> {
 
     /// What the filter does when the world is `truth`, which has the states of the filter.
     pub fn expectation(&self, truth: &LinearModel) -> Expectation {
-        let lengths = |c: &super::course::Channel| c.lengths.iter().map(|l| *l as u64 * c.base).collect();
+        let lengths = |c: &super::sums::Channel| c.lengths.iter().map(|l| *l as u64 * c.base).collect();
         let lengths: Vec<Vec<u64>> = self.axis.channels.iter().map(lengths).collect();
         expect(&self.axis.filter, truth, &self.axis.gains, &self.axis.judge, &lengths)
     }
@@ -268,15 +236,8 @@ impl<'a> Instrument<'a> {
             (low, high) = (high, (4.0 * high).min(limit));
             seen = power(high)?;
         }
-        while high - low > ACCURACY * high {
-            let middle = 0.5 * (low + high);
-            let at = power(middle)?;
-            if at.probability < WISHED {
-                low = middle;
-            } else {
-                (high, seen) = (middle, at);
-            }
-        }
+        let close = |low: f64, high: f64| (high - low > ACCURACY * high).then_some(0.5 * (low + high));
+        let (high, seen) = narrowed((low, high), seen, close, power)?;
         Some(Sighting { size: size(high), test: test_name(self.axis, seen.kind), confirmed: None })
     }
 }
@@ -332,18 +293,6 @@ pub fn detectable(experiment: &Experiment, own: &Course, gate: &Gate, runs: u64)
     (0..own.axes.len()).flat_map(of_axis).collect()
 }
 
-/// How surely the gate rejects the truth that was given.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Rejection {
-    /// Predicted probability, that of the most powerful test: at least this.
-    pub probability: f64,
-    pub axis: String,
-    pub test: String,
-    /// By simulation, where it was asked for.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub confirmed: Option<Caught>,
-}
-
 /// Power of the gate of `course` against the course's own truth.
 pub fn rejection(course: &Course, gate: &Gate, runs: u64) -> Option<Rejection> {
     let of_axis = |number: usize| {
@@ -373,8 +322,8 @@ pub fn confirm(
             let Some(what) = all.iter().find(|what| what.name(axis) == entry.parameter) else { continue };
             for sighting in [&mut entry.too_large, &mut entry.too_small].into_iter().flatten() {
                 let truth = what.truth(experiment, number, sighting.size)?;
-                let course = AxisCourse::new(&experiment.design.axes[number], truth, None, own.steps)?;
-                let course = Course { axes: vec![course], ..own.clone() };
+                let course = AxisCourse::new(&experiment.design.axes[number], truth, own.steps)?;
+                let course = Course::new(vec![course], vec![None], own.steps, own.seed, own.dt);
                 let caught = caught_of_experiments(
                     &course,
                     &gate.axes[number..=number],
@@ -423,7 +372,7 @@ pub fn plan(
     let design = &experiment.design.axes[number];
     let shortest = (design.steady_state.settling_time / own.dt).ceil().max(super::course::MIN_STEPS as f64) as u64;
     let of_steps = |steps: u64| {
-        let axis = AxisCourse::new(design, truth.clone(), None, steps).ok()?;
+        let axis = AxisCourse::new(design, truth.clone(), steps).ok()?;
         let gate = &gate.axes[number];
         let kinds = Kind::of(&axis);
         if kinds != gate.kinds {
@@ -451,14 +400,27 @@ fn least(first: u64, last: u64, power: impl Fn(u64) -> Option<Power>) -> Option<
         (low, high) = (high, (2 * high).min(last));
         seen = power(high)?;
     }
-    while high - low > 1 + high / 100 {
-        let middle = low + (high - low) / 2;
-        let at = power(middle)?;
-        if at.probability < WISHED {
-            low = middle;
-        } else {
-            (high, seen) = (middle, at);
-        }
-    }
+    let close = |low: u64, high: u64| (high - low > 1 + high / 100).then_some(low + (high - low) / 2);
+    let (high, seen) = narrowed((low, high), seen, close, power)?;
     Some((high, seen.kind))
+}
+
+/// The least place at which the power is as wished, between one where it is not and one where it is `seen`, and the
+/// power there.
+fn narrowed<T: Copy>(
+    (low, high): (T, T),
+    mut seen: Power,
+    between: impl Fn(T, T) -> Option<T>,
+    power: impl Fn(T) -> Option<Power>,
+) -> Option<(T, Power)> {
+    let past = |middle| {
+        let at = power(middle).ok_or(())?;
+        let enough = at.probability >= WISHED;
+        if enough {
+            seen = at;
+        }
+        Ok::<_, ()>(enough)
+    };
+    let (_, high) = bisect(low, high, between, past).ok()?;
+    Some((high, seen))
 }

@@ -2,12 +2,14 @@
 
 use super::MonteCarloError;
 use super::course::model_of;
-use super::lanes::PARAMETERS;
 use crate::filter::FilterDesign;
 use crate::model::LinearModel;
 use crate::numerics::distribution::NORMAL_95;
 use crate::numerics::random::{StreamId, normal, stream};
 use crate::params::{AxisParams, Measured};
+
+/// Term part of the stream addresses of drawn parameters, beside those of the runs (in `scratch`).
+const PARAMETERS: u32 = 0x13_0000;
 
 /// Parameters of one axis with their intervals.
 #[derive(Clone, Debug)]

@@ -1,8 +1,16 @@
 //! What is added up over runs: without rounding, so that threads, batches, shards and resumed runs leave no trace.
 
-use super::course::Channel;
+use crate::consistency::low_frequency::block_lengths;
 use crate::numerics::exact_sum::ExactSum;
 
+/// Lags of the autocorrelation, at most.
+const LAGS: u64 = 20;
+/// Series of block means that the cumulative periodogram looks at have at least and at most this many points.
+const BLOCKS: [u64; 2] = [32, 1024];
+/// Each block length of the low-frequency test is this many times the one before.
+const LENGTH_RATIO: u64 = 4;
+/// Block lengths go up to this many times the longest time constant of the filter.
+const LONGEST_BLOCK: f64 = 16.0;
 /// Width of a bin of the NIS histogram, and number of bins; what is beyond goes into one more.
 pub(super) const NIS_BIN: f64 = 0.25;
 pub(super) const NIS_BINS: usize = 40;
@@ -113,5 +121,61 @@ impl Totals {
     }
     pub(super) fn some(&self, first: usize, count: usize) -> Vec<f64> {
         self.values[first..first + count].iter().map(ExactSum::value).collect()
+    }
+}
+
+/// One measurement of an axis and how its innovations are summed up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Channel {
+    pub name: String,
+    /// Taken at every n-th step.
+    pub every: u64,
+    /// Updates in a run.
+    pub updates: u64,
+    /// Lags 1..=lags of the autocorrelation.
+    pub lags: usize,
+    /// Updates in a base block.
+    pub base: u64,
+    /// Complete base blocks in a run.
+    pub blocks: usize,
+    /// Block lengths of the low-frequency test, in base blocks.
+    pub lengths: Vec<usize>,
+    /// Frequencies of the cumulative periodogram of the base blocks, without zero and Nyquist; 0 when there are too
+    /// few.
+    pub ordinates: usize,
+}
+
+impl Channel {
+    pub(super) fn new(name: &str, every: u64, steps: u64, time_constants: &[f64]) -> Channel {
+        let updates = steps.div_ceil(every);
+        let own: Vec<f64> = time_constants.iter().map(|t| t / every as f64).collect();
+        let least = updates.div_ceil(BLOCKS[1]);
+        let most = (updates / BLOCKS[0]).max(1);
+        let base = block_lengths(&own).first().copied().unwrap_or(1).clamp(least.min(most), most);
+        let longest = own.iter().copied().fold(0.0, f64::max) * LONGEST_BLOCK;
+        let longest = if longest > 0.0 { longest } else { f64::INFINITY };
+        let blocks = updates / base;
+        let lengths = std::iter::successors(Some(1), |length| Some(length * LENGTH_RATIO))
+            .take_while(|length| *length <= blocks && (*length == 1 || (length * base) as f64 <= longest))
+            // single updates are what the NIS judges
+            .filter(|length| length * base > 1)
+            .map(|length| length as usize)
+            .collect();
+        let ordinates = (blocks as usize - 1) / 2;
+        Channel {
+            name: name.into(),
+            every,
+            updates,
+            lags: LAGS.min(updates / 10).max(1) as usize,
+            base,
+            blocks: blocks as usize,
+            lengths,
+            ordinates: if ordinates < 8 { 0 } else { ordinates },
+        }
+    }
+
+    /// Complete blocks of `length` base blocks in a run.
+    pub fn blocks_of(&self, length: usize) -> usize {
+        self.blocks / length
     }
 }

@@ -16,6 +16,7 @@ use rand::rngs::ChaCha8Rng;
 
 use super::second_difference::{WEIGHTS, lag_sum};
 use super::{Realisation, SamplePath};
+use crate::numerics::optimize::bracketed_root;
 use crate::numerics::random::{fill_normal, normal};
 
 /// Of numerator and denominator, at most.
@@ -218,12 +219,7 @@ impl Filter {
         const STEPS: usize = 4096;
         let at = |i: usize| 0.5 * i as f64 / STEPS as f64;
         let first = (1..=STEPS).find(|i| self.power_gain(at(*i)) <= 0.5)?;
-        let (mut low, mut high) = (at(first - 1), at(first));
-        for _ in 0..40 {
-            let middle = 0.5 * (low + high);
-            if self.power_gain(middle) > 0.5 { low = middle } else { high = middle }
-        }
-        Some(high)
+        bracketed_root(|turns| self.power_gain(turns) - 0.5, at(first - 1), at(first), 0.0)
     }
 
     /// Samples in which what the slowest pole remembers falls to 1/e: −1/ln of the growth of Fᵏ, k = 2¹⁰.

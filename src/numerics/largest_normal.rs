@@ -1,8 +1,11 @@
 //! Law of the largest absolute value of correlated standard normal numbers.
 
+use std::convert::Infallible;
+
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::distribution::{normal_quantile, normal_sf};
+use super::optimize::{bisect, half_way};
 use super::random::{StreamId, fill_normal, stream};
 
 /// Draws behind every probability, at least; its relative error is then below 2 %.
@@ -67,13 +70,9 @@ impl LargestNormal {
         (2.0 * single * count as f64 * mean).min(1.0)
     }
 
-    /// z with P(max |Z| > z) = p, by bisection.
+    /// z with P(max |Z| > z) = p, which moves in the steps of the draws.
     pub fn quantile(&self, p: f64) -> f64 {
-        let (mut low, mut high) = (0.0, 38.0);
-        for _ in 0..40 {
-            let middle = 0.5 * (low + high);
-            if self.tail(middle) > p { low = middle } else { high = middle }
-        }
+        let Ok((low, high)) = bisect(0.0, 38.0, half_way(5e-11), |z| Ok::<_, Infallible>(self.tail(z) <= p));
         0.5 * (low + high)
     }
 }

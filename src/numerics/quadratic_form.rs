@@ -72,18 +72,14 @@ impl QuadraticForm {
     /// The inverse: x with P(X ≤ x) = Φ(z).
     pub fn quantile(&self, z: f64, freedom: f64) -> f64 {
         let root = freedom.sqrt();
-        let (mut low, mut high) = match (self.nodes.first(), self.nodes.last()) {
-            (Some(first), Some(last)) => (first[0] - 2.0, last[0] + 2.0),
-            _ => return f64::NAN,
-        };
-        while high - low > 1e-14 * (1.0 + low.abs().max(high.abs())) {
-            let middle = 0.5 * (low + high);
-            if middle <= low || middle >= high {
-                break;
-            }
-            if self.z(middle.exp() * root * root, freedom) < z { low = middle } else { high = middle }
+        let z_of = |[_, r, c]: [f64; 3]| root * r + c / root;
+        if z.is_nan() || self.nodes.len() < 2 {
+            return f64::NAN;
         }
-        high.exp() * freedom
+        let above = self.nodes.partition_point(|node| z_of(*node) <= z).clamp(1, self.nodes.len() - 1);
+        let (low, high) = (self.nodes[above - 1], self.nodes[above]);
+        let part = (z - z_of(low)) / (z_of(high) - z_of(low));
+        (low[0] + part * (high[0] - low[0])).exp() * freedom
     }
 }
 

@@ -8,7 +8,7 @@ mod written;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::document::axis;
+use super::axis::axis;
 use super::measured::Range;
 use super::place::{self, KeyError, Object, Place};
 use super::{AxisParams, Measured, ParamsError};

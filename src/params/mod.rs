@@ -4,6 +4,7 @@
 //! `place` reads JSON key by key with the place of every complaint, `measured` is a value with its unit, `document` the
 //! layout of the file and its schema, `design` its section on the plant.
 
+mod axis;
 mod design;
 mod document;
 mod measured;
@@ -285,7 +286,7 @@ impl AxisParams {
 
     /// Reads an axis that stands in another document; `place` names where.
     pub fn from_place(place: &Place<'_>, quantity: Quantity) -> Result<AxisParams, KeyError> {
-        document::axis(place, quantity)
+        axis::axis(place, quantity)
     }
 }
 

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::document::{in_unit, seconds};
+use super::axis::{in_unit, seconds};
 use super::place::{KeyError, Place};
 use super::{BetweenLogs, Check, Inflated, Measured, Source};
 

@@ -11,6 +11,7 @@ use crate::filter::steady_state::{SteadyState, SteadyStateError, steady_state};
 use crate::model::observability::undriven_states;
 use crate::model::{DRIFT, LinearModel};
 use crate::numerics::linalg::{LinalgError, symmetrise};
+use crate::numerics::optimize::bracketed_root;
 use crate::numerics::riccati::lyapunov;
 
 /// One cause of the final variance.
@@ -215,9 +216,5 @@ pub fn bandwidth_hz(model: &LinearModel, steady: &SteadyState) -> Option<f64> {
         low = high;
         high = (high * 1.25).min(nyquist);
     }
-    for _ in 0..60 {
-        let middle = (low * high).sqrt();
-        if power(middle)? > half { low = middle } else { high = middle }
-    }
-    Some((low * high).sqrt())
+    bracketed_root(|ln| power(ln.exp()).map(|power| power - half), low.ln(), high.ln(), 0.0).map(f64::exp)
 }

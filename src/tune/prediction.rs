@@ -8,6 +8,7 @@ use super::sensor::drift_sigma;
 use crate::filter::Cycle;
 use crate::model::LinearModel;
 use crate::numerics::linalg::{LinalgError, solve_spd, symmetrise};
+use crate::numerics::optimize::bisect;
 
 /// Points per decade of time.
 const PER_DECADE: i32 = 8;
@@ -59,12 +60,11 @@ pub(super) fn settled_after(
     // between two samples at which all measurements are taken the sigma is another
     let period = cycle(model)?.period;
     let unit = if steps(*inside) > period { period } else { 1 };
-    let (mut low, mut high) = (steps(predicted.time_s[last]) / unit, steps(*inside).div_ceil(unit));
-    while high - low > 1 {
-        let middle = low + (high - low) / 2;
-        let p = covariances(model, &[middle * unit])?;
-        if p.iter().any(|p| outside(sigma_of(p))) { low = middle } else { high = middle }
-    }
+    let (low, high) = (steps(predicted.time_s[last]) / unit, steps(*inside).div_ceil(unit));
+    let between = |low: u64, high: u64| (high - low > 1).then_some(low + (high - low) / 2);
+    let (_, high) = bisect(low, high, between, |middle| {
+        Ok::<_, LinalgError>(!covariances(model, &[middle * unit])?.iter().any(|p| outside(sigma_of(p))))
+    })?;
     Ok(Some((high * unit) as f64 * model.dt))
 }
 

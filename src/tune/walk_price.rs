@@ -7,6 +7,7 @@ use crate::filter::mismatch::{ExpectedError, expect, expect_settled};
 use crate::filter::{Cycle, Judge, Kalman};
 use crate::model::{DRIFT, LinearModel, Named, Output};
 use crate::noise::Term;
+use crate::numerics::optimize::lowest;
 use crate::numerics::riccati::dare_doubling;
 use crate::units::Quantity;
 
@@ -14,8 +15,8 @@ use crate::units::Quantity;
 const START: f64 = 60.0;
 /// Points over which the least price is looked for before it is bracketed: two neighbours are less than a factor of three apart.
 const COARSE: usize = 12;
-/// Steps of the golden section: K to 0.3 %, where the price is flat.
-const GOLDEN: usize = 12;
+/// K is looked for to this share of the bracket, where the price is flat.
+const WIDTH: f64 = 4e-3;
 
 /// A filter that integrates a sensor and is aided; SI.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -151,7 +152,7 @@ impl WalkTrial {
         let step = (high - low) / COARSE as f64;
         let at = |i: usize| low + step * i as f64;
         let best = (0..=COARSE).map(|i| (i, price(at(i)))).min_by(|a, b| a.1.total_cmp(&b.1))?.0;
-        let k = floor(at(best.saturating_sub(1)), at((best + 1).min(COARSE)), price).exp();
+        let k = valley(price, at(best.saturating_sub(1)), at((best + 1).min(COARSE))).exp();
         Some((k, self.price(k)?))
     }
 }
@@ -167,26 +168,11 @@ pub fn shared_walk(trials: &[&WalkTrial], least: &[f64]) -> f64 {
         let price = |trial: &&WalkTrial| trial.price(log.exp()).map_or(f64::INFINITY, |price| price.worst());
         trials.iter().map(price).fold(0.0, f64::max)
     };
-    floor(low.ln(), high.ln(), dearest).exp()
+    valley(dearest, low.ln(), high.ln()).exp()
 }
 
-/// Golden section in a valley.
-fn floor(mut low: f64, mut high: f64, price: impl Fn(f64) -> f64) -> f64 {
-    let golden = 0.5 * (5f64.sqrt() - 1.0);
-    let mut inner = [high - golden * (high - low), low + golden * (high - low)];
-    let mut found = inner.map(&price);
-    for _ in 0..GOLDEN {
-        if found[0] < found[1] {
-            high = inner[1];
-            inner = [high - golden * (high - low), inner[0]];
-            found = [price(inner[0]), found[0]];
-        } else {
-            low = inner[0];
-            inner = [inner[1], low + golden * (high - low)];
-            found = [found[1], price(inner[1])];
-        }
-    }
-    0.5 * (low + high)
+fn valley(price: impl Fn(f64) -> f64, low: f64, high: f64) -> f64 {
+    lowest(price, low, high, WIDTH * (high - low))
 }
 
 /// From one measurement to the next: y_1 ← y_1 + dt y_2 …, the last y ← y + dt (b + Σ d_i + w), var w = N²/dt, each step; b a walk of density `walk`

@@ -58,6 +58,10 @@ fn the_default_walk_costs_least() {
     bench.file("mpu.json", std::fs::read_to_string(data("sensors/invensense-mpu-6000.json")).unwrap());
     let told = bench.run("export mpu.json --to kalibr --walk short");
     assert!(price(&told.stdout)[0] > 1.3, "{}", told.stdout);
+    // a datasheet is no log at rest
+    assert!(
+        told.stdout.contains("# given, not from a log: a lower bound") && !told.stdout.contains("identified at rest")
+    );
 }
 
 /// A log in which no drift was found: a program with a default keeps it, one that needs a number gets the 95 % limit of `identify`, and without a limit

@@ -10,6 +10,7 @@ intact files, which are cut, repeated and changed. Needs nothing but Python's ow
 import argparse, bz2, gzip, json, os, random, resource, shutil, signal, struct, subprocess, sys, tempfile, time, zlib
 
 R = random.Random()
+STACKS = 2 * (2 << 20)  # of two threads: the system counts them as a whole, though they are hardly used
 CALM = 0  # how often a number is one that makes sense, so that readers also come far
 
 
@@ -96,7 +97,7 @@ def mat():
             length = R.choice([1, 1, 8, 32, odd()])
             names = chaos(R.choice([1, 8, 64, 3000, 65536, 1 << 20]))
             inner = matrix(depth + 1)
-            rest = element(5, struct.pack('<I', length)) + element(1, names) + inner * R.choice([1, 1, 3, min(count(), 3000)])
+            rest = element(5, struct.pack('<I', length)) + element(1, names) + inner * min(R.choice([1, 1, 3, min(count(), 3000)]), max(1, 4000000 // len(inner)))
         elif R.random() < 0.8:
             n = min(rows * columns, 1 << R.choice([4, 10, 20]))
             rest = element(9, bytes(8 * n)) if R.random() < 0.5 else element(R.choice([1, 2, 5, 7, 99]), bytes(n), odd() if R.random() < 0.2 else None)
@@ -411,7 +412,7 @@ def one(seed, formats, samples):
 
 def judged(exe, path, out, size):
     """Exit status, seconds and what was said of a file, within what such a file may take."""
-    allowed = 4 * size + (16 << 20)
+    allowed = 4 * size + (16 << 20) + STACKS
     status, seconds = run(exe, path, out, allowed)
     if status not in (0, 2) and run(exe, path, out, 8 << 30)[0] == 0:
         # the numbers that are kept come on top

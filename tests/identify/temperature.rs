@@ -352,7 +352,9 @@ fn columns_and_units() {
         })
         .collect();
     bench.file("holes.csv", format!("t_s,gyro_x (deg/s),temp_c\n{rows}"));
-    let document: Value = serde_json::from_str(&bench.run("identify holes.csv --model white --json").stdout).unwrap();
+    let out = bench.run("identify holes.csv --model white --json");
+    assert_eq!(out.status, 1, "drift that the model does not have is told: {}", out.stderr);
+    let document: Value = serde_json::from_str(&out.stdout).unwrap();
     assert_eq!(document["axes"][0]["filled"], 60 + 8);
     assert!((value(&document) - 0.05).abs() < 0.003, "{}", value(&document));
     // an angle, and a gap in the time stamps
@@ -367,8 +369,9 @@ fn columns_and_units() {
         })
         .collect();
     bench.file("angle.csv", format!("t_s,gyro_x (deg),temp_c\n{rows}"));
-    let out = bench.run("identify angle.csv --input angle --model white --json").stdout;
-    let document: Value = serde_json::from_str(&out).unwrap();
+    let out = bench.run("identify angle.csv --input angle --model white --json");
+    assert_eq!(out.status, 1, "{}", out.stderr);
+    let document: Value = serde_json::from_str(&out.stdout).unwrap();
     assert!((value(&document) - 0.05).abs() < 0.003, "{}", value(&document));
 }
 
@@ -423,6 +426,6 @@ fn words_of_the_command() {
     let (said, _) = run("a.csv c.csv", "");
     assert!(said.contains("turn_on_bias.std_dev") || said.contains("the bias follows"), "{said}");
     // other methods do not look for one
-    let said = bench.run("identify a.csv --rate 1 --model white --method allan").stdout;
-    assert!(!said.contains("emperature"), "{said}");
+    let out = bench.run("identify a.csv --rate 1 --model white --method allan");
+    assert!(out.status == 1 && !out.stdout.contains("emperature"), "{out:?}");
 }

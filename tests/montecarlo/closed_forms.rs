@@ -1,5 +1,6 @@
 //! Statistics against what theory says they are.
 
+use kfdesign::montecarlo::gate::LeastLaw;
 use serde_json::Value;
 
 use super::{SMALL, bench, changed};
@@ -122,4 +123,22 @@ fn false_alarms_are_as_many_as_intended() {
     }
     let alone: f64 = tests.iter().map(|test| test["rejected"].as_f64().unwrap()).sum();
     assert!(alone >= rate["value"].as_f64().unwrap(), "{rate}: an alarm is that of some test");
+}
+
+/// Values in the middles of equal parts have the law P(p_min ≤ t) = t; beyond the fiftieth the power of t that leads
+/// there from the five-hundredth. The quantile is the inverse of both.
+#[test]
+fn the_law_of_uniform_least_values() {
+    let count = 2000;
+    let law = LeastLaw::new((0..count).rev().map(|i| (f64::from(i) + 0.5) / f64::from(count)).collect());
+    for p in [0.03, 0.2, 0.50001, 0.9] {
+        assert!((law.quantile(p) - p).abs() < 1e-14 && (law.cdf(p) - p).abs() < 1e-14, "{p}: {}", law.quantile(p));
+    }
+    let power = 10f64.ln() / f64::ln(499.5 / 49.5);
+    for t in [1e-12_f64, 1e-4, 0.02] {
+        let p = 49.5 / 2000.0 * (t * 2000.0 / 49.5).powf(power);
+        assert!((law.cdf(t) / p - 1.0).abs() < 1e-12 && (law.quantile(p) / t - 1.0).abs() < 1e-12, "{t}");
+    }
+    assert_eq!((law.quantile(0.0), law.quantile(1.0)), (0.0, 1999.5 / 2000.0));
+    assert_eq!(LeastLaw::new(vec![]).quantile(0.9), 1.0);
 }

@@ -2,8 +2,14 @@
 
 #![allow(dead_code, reason = "shared by all test modules; not every helper is used by each")]
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::{Mutex, PoisonError};
+
+use serde_json::Value;
+
+use crate::params::accepts;
 
 /// What a run of the binary gave.
 #[derive(Debug)]
@@ -50,9 +56,13 @@ impl Bench {
     pub fn run_args(&self, args: &[&str]) -> Outcome {
         let output =
             Command::new(env!("CARGO_BIN_EXE_kfdesign")).args(args).current_dir(self.dir.path()).output().unwrap();
+        let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
+        if args.contains(&"--json") {
+            fits_its_schema(&stdout);
+        }
         Outcome {
             status: output.status.code().unwrap_or(-1),
-            stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
+            stdout,
             stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
         }
     }
@@ -62,6 +72,20 @@ impl Bench {
         assert_eq!(out.status, 0, "kfdesign {args}\nstdout: {}\nstderr: {}", out.stdout, out.stderr);
         out.stdout
     }
+}
+
+/// A document that any test prints is one of its published schema, `kfdesign schema NAME` of the format "kfdesign-NAME/1".
+pub fn fits_its_schema(printed: &str) {
+    static SCHEMAS: Mutex<BTreeMap<String, Value>> = Mutex::new(BTreeMap::new());
+    let Ok(document) = serde_json::from_str::<Value>(printed) else { return };
+    let format = document["format"].as_str().unwrap_or_else(|| panic!("a document without a format: {printed}"));
+    let name = format.strip_prefix("kfdesign-").and_then(|rest| rest.strip_suffix("/1")).unwrap();
+    let mut schemas = SCHEMAS.lock().unwrap_or_else(PoisonError::into_inner);
+    let schema = schemas.entry(name.to_owned()).or_insert_with(|| {
+        let printed = Command::new(env!("CARGO_BIN_EXE_kfdesign")).args(["schema", name]).output().unwrap();
+        serde_json::from_slice(&printed.stdout).unwrap_or_else(|_| panic!("no schema of {format}"))
+    });
+    accepts(schema, schema, &document).unwrap_or_else(|why| panic!("{format}: {why}"));
 }
 
 /// The figure of a report page, by its title.

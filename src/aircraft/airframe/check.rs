@@ -1,11 +1,14 @@
 //! What an airplane document says and whether it makes sense: margins, signs, sizes, and the speeds of level flight.
 
+use std::convert::Infallible;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::trim::{Sideways, Trim, TrimError, TrimRequest, Turn};
 use super::{Airplane, Propulsion};
 use crate::aircraft::atmosphere::standard::{self, GRAVITY};
+use crate::numerics::optimize::{bisect, half_way};
 
 pub const FORMAT: &str = "kfdesign-airplane-check/1";
 
@@ -148,13 +151,11 @@ impl Airplane {
         let speeds: Vec<f64> = (0..=STEPS).map(|i| unit_speed * SPEEDS[0] * ratio.powi(i as i32)).collect();
         let first = speeds.iter().position(|v| level(*v).is_ok())?;
         let last = first + speeds[first..].iter().take_while(|v| level(**v).is_ok()).count() - 1;
-        let end = |mut inside: f64, outside: Option<&f64>| {
-            let Some(mut outside) = outside.copied() else { return (inside, None) };
+        let end = |inside: f64, outside: Option<&f64>| {
+            let Some(&outside) = outside else { return (inside, None) };
             // to rounding of what is worth to print
-            for _ in 0..40 {
-                let middle = 0.5 * (inside + outside);
-                if level(middle).is_ok() { inside = middle } else { outside = middle }
-            }
+            let Ok((inside, outside)) =
+                bisect(inside, outside, half_way(1e-12 * unit_speed), |v| Ok::<_, Infallible>(level(v).is_err()));
             (inside, level(outside).err().map(|e| e.missing))
         };
         let (slowest, slowest_limit) = end(speeds[first], first.checked_sub(1).and_then(|i| speeds.get(i)));

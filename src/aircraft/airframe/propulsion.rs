@@ -6,6 +6,8 @@
 
 use std::f64::consts::TAU;
 
+use crate::numerics::optimize::bracketed_root;
+
 /// A coefficient over the advance ratio J.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Curve {
@@ -87,17 +89,13 @@ impl Motor {
             return (((b * b - 4.0 * a * c).max(0.0).sqrt() - b) / (2.0 * a)).max(0.0);
         }
         let lack = |w: f64| scale * self.torque.of_speeds(w, v) + loss * w - rest;
-        let (mut low, mut high) = (0.0, (volts / k * d / TAU).max(0.0));
+        let high = (volts / k * d / TAU).max(0.0);
         if lack(high) < 0.0 {
             return high;
         }
-        // the torque of the motor falls with the rate and that of the propeller rises: one crossing, by halving to
-        // rounding
-        for _ in 0..60 {
-            let middle = 0.5 * (low + high);
-            if lack(middle) < 0.0 { low = middle } else { high = middle }
-        }
-        0.5 * (low + high)
+        // the torque of the motor falls with the rate and that of the propeller rises: one crossing, or the air turns
+        // nothing
+        bracketed_root(lack, 0.0, high, 0.0).unwrap_or(0.0)
     }
 
     /// Thrust and reaction at a speed w = nD of the propeller.

@@ -2,7 +2,7 @@
 //!
 //! Eight unknowns α, β, φ, θ, δe, δa, δr, δt; p = −ψ̇ sin θ, q = ψ̇ sin φ cos θ, r = ψ̇ cos φ cos θ. Eight equations:
 //! the six accelerations vanish, ḣ = V sin γ, and one on the sideways motion. Newton's method from the angles of a
-//! point mass.
+//! point mass; `numerics::optimize` has no systems of equations.
 
 use nalgebra::{SMatrix, SVector};
 

@@ -1,7 +1,7 @@
 //! Figures and the report page of an identification.
 
 use super::{Axis, STEPS, costs, headline, not_identified, step_rows, tables};
-use crate::cli::allan_figure;
+use crate::cli::allan;
 use crate::params::Params;
 use crate::report::figure;
 use crate::report::page::{Page, PageError, Section};
@@ -9,7 +9,7 @@ use crate::units::digits;
 
 /// All axes, one above the other.
 pub(super) fn sheet(log: &str, axes: &[Axis]) -> String {
-    let figures: Vec<String> = axes.iter().map(|axis| allan_figure::figure(&axis.measured)).collect();
+    let figures: Vec<String> = axes.iter().map(|axis| allan::figure(&axis.measured)).collect();
     figure::sheet(&format!("{log}: overlapping Allan deviation"), &figures)
 }
 
@@ -52,7 +52,7 @@ fn section(axis: &Axis, params: &Params) -> Section {
         section = section.warning(warning.clone());
     }
     section = section.figures(vec![(
-        allan_figure::figure(&axis.measured),
+        allan::figure(&axis.measured),
         "The measured curve with exact 95 % intervals for the model, and the model's terms.".to_string(),
     )]);
     if !found.not_identified.is_empty() {

@@ -1,5 +1,6 @@
 //! The temperature of the logs beside what `identify` found, in words, as a table and as JSON.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::tables;
@@ -100,7 +101,7 @@ pub(super) struct Shown {
 }
 
 /// What `identify --json` says of it.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 pub(super) struct Document<'a> {
     column: &'a str,
     /// Length of the average by which the temperature is replaced, s.
@@ -125,7 +126,7 @@ pub(super) struct Document<'a> {
     reason: Option<&'a str>,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct PairDocument<'a> {
     parameter: &'a str,
     without: &'a Measured,

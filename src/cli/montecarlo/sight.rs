@@ -3,9 +3,8 @@
 use super::text;
 use crate::cli::output::digits;
 use crate::consistency::Test;
-use crate::montecarlo::calibration::FalseAlarmRate;
 use crate::montecarlo::course::AxisCourse;
-use crate::montecarlo::outcome::{Component, Innovations};
+use crate::montecarlo::outcome::{Component, FalseAlarmRate, Innovations};
 use crate::montecarlo::{AxisOutcome, Course, Experiment, Outcome, Path};
 use crate::params::{AxisParams, Measured};
 use crate::report::figure::{self, Curve};

@@ -1,8 +1,8 @@
 //! A Monte Carlo verdict as a person reads it.
 
 use crate::cli::output::{digits, table};
-use crate::montecarlo::calibration::{FalseAlarmRate, Method};
-use crate::montecarlo::power::{Detectable, Measure, Needed, Rejection, Sighting};
+use crate::montecarlo::outcome::{Detectable, FalseAlarmRate, Measure, Method, Rejection, Sighting};
+use crate::montecarlo::power::Needed;
 use crate::montecarlo::{AxisOutcome, Outcome};
 
 pub(super) const TESTS: [&str; 9] =

@@ -1,18 +1,24 @@
 //! `tune --plant attitude`.
 
 use anyhow::{Context, bail};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::objective::ObjectiveArg;
 use super::{Args, Status};
 use crate::cli::output::{digits, notes, print_json, print_text, table};
 use crate::export::atomic;
+use crate::filter::AttitudeDesign;
 use crate::params::{Design, Params};
 use crate::tune::{AtRest, TunedAttitude, tune_attitude};
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Printed<'a> {
+/// What `tune --plant attitude --json` prints.
+#[derive(Serialize, JsonSchema)]
+pub(in crate::cli) struct Printed<'a> {
+    /// "kfdesign-tune-attitude/1".
+    format: &'static str,
+    /// As written with `-o`.
+    #[schemars(with = "AttitudeDesign")]
     filter: serde_json::Value,
     at_rest: &'a [AtRest],
 }
@@ -36,7 +42,7 @@ pub(super) fn run(args: &Args, name: &str, params: &Params, design: &Design) -> 
     }
     if args.json {
         let filter = serde_json::from_str(&tuned.design.to_json())?;
-        print_json(&Printed { filter, at_rest: &tuned.at_rest })?;
+        print_json(&Printed { format: "kfdesign-tune-attitude/1", filter, at_rest: &tuned.at_rest })?;
     } else {
         let mut printed = text(name, &tuned);
         if let Some(output) = &args.output {

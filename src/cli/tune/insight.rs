@@ -1,6 +1,6 @@
 //! When states are known, what better parts buy, what wrong parameters cost: as text and for the page.
 
-use super::text::Group;
+use super::view::Group;
 use crate::cli::output::{digits, duration, shown_unit, table};
 use crate::filter::single::{SingleForm, SinglePrecision, SingleResult};
 use crate::report::figure::{self, Curve, Worth as WorthFigure};

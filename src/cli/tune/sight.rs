@@ -1,6 +1,7 @@
 //! Figures and the report page of a design.
 
-use super::text::{self, Group, View, shown};
+use super::text;
+use super::view::{Group, View, shown, told};
 use super::{insight, truth};
 use crate::cli::output::{digits, shown_unit};
 use crate::montecarlo::{AxisOutcome, Outcome};
@@ -121,7 +122,7 @@ fn section(group: &Group<'_>, quantity: Quantity) -> Section {
 fn sigma(group: &Group<'_>, quantity: Quantity) -> String {
     let (model, predicted) = (&group.design.model, &group.report.predicted);
     let mut states: Vec<SigmaState> = Vec::new();
-    for i in text::told(model) {
+    for i in told(model) {
         let sigma = &predicted.sigma[i];
         if model.states[i].unit == quantity.si_unit() {
             let scale = shown(model, i, quantity, &group.unit).0;

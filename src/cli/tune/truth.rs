@@ -1,6 +1,6 @@
 //! The design under another truth, as a person reads it.
 
-use super::text::{View, shown, title, told};
+use super::view::{View, shown, title, told};
 use crate::cli::output::{digits, table};
 use crate::model::LinearModel;
 use crate::report::page::Section;

@@ -57,6 +57,8 @@ pub struct Export {
     pub inflation: f64,
     /// What the logs behind the parameters have failed; see [`crate::params::Source::failed`].
     pub failed: Vec<String>,
+    /// All parameters were identified from logs.
+    pub from_log: bool,
     /// Lines about the factors that the white noise of the parameters has in it already.
     pub measured_inflation: Vec<String>,
     pub choice: Choice,

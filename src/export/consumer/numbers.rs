@@ -2,6 +2,7 @@
 
 use super::filters::Aiding;
 use crate::noise::{NoiseModel, Term};
+use crate::numerics::optimize::lowest;
 use crate::params::{AxisParams, Measured, Params, TermEntry};
 use crate::tune::{AidedFilter, SensorDrift, WalkPrice, WalkTrial};
 use crate::units::{Quantity, digits};
@@ -302,13 +303,7 @@ fn valley(low: f64, high: f64, of: impl Fn(f64) -> f64) -> (f64, f64) {
     let step = (high - low) / f64::from(POINTS);
     let points = (0..=POINTS).map(|i| low + f64::from(i) * step).map(|x| (x, of(x)));
     let (best, value) = points.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((low, f64::INFINITY));
-    let golden = 0.5 * (5f64.sqrt() - 1.0);
-    let (mut low, mut high) = ((best - step).max(low), (best + step).min(high));
-    while high - low > 1e-6 {
-        let [left, right] = [high - golden * (high - low), low + golden * (high - low)];
-        if of(left) < of(right) { high = right } else { low = left }
-    }
-    let middle = 0.5 * (low + high);
+    let middle = lowest(&of, (best - step).max(low), (best + step).min(high), 1e-6);
     let found = of(middle);
     if found < value { (middle, found) } else { (best, value) }
 }

@@ -62,10 +62,11 @@ impl Page {
             (true, false) => "none beyond the measured one below".into(),
             (false, _) => format!("N and K (and sigma) are {} times those below", digits(export.inflation)),
         };
-        // a log that moved says nothing of the sensor at rest
-        let origin = match export.failed.is_empty() {
-            true => format!("{drift}identified at rest: a lower bound of what a moving vehicle shows"),
-            false => format!("identified although a check failed: {}", export.failed.join("; ")),
+        // a log that moved says nothing of the sensor at rest, and a datasheet has none
+        let origin = match (export.failed.is_empty(), export.from_log) {
+            (true, true) => format!("{drift}identified at rest: a lower bound of what a moving vehicle shows"),
+            (true, false) => format!("{drift}given, not from a log: a lower bound of what a moving vehicle shows"),
+            (false, _) => format!("identified although a check failed: {}", export.failed.join("; ")),
         };
         head.push(format!("{origin}; inflation: {inflation}; details below"));
         let mut details = vec![export.choice_words()];

@@ -1,9 +1,10 @@
 //! The attitude.json document: everything an independent filter needs, SI.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use nalgebra::{DMatrix, DVector};
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -197,6 +198,15 @@ impl AttitudeDesign {
 
     pub fn schema() -> Value {
         schemars::schema_for!(Document).to_value()
+    }
+}
+
+impl JsonSchema for AttitudeDesign {
+    fn schema_name() -> Cow<'static, str> {
+        "AttitudeDesign".into()
+    }
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        Document::json_schema(generator)
     }
 }
 

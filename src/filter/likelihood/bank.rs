@@ -5,8 +5,8 @@
 use nalgebra::DMatrix;
 use pulp::{Arch, Simd, WithSimd};
 
-use super::lane::{LANES, Lane};
-use super::settled::{self, Settled, Totals, Transition};
+use super::lane::{LANES, Lane, dot};
+use super::settled::{self, COLUMNS, Samples, Settled, Totals, Transition};
 use crate::filter::Kalman;
 use crate::model::LinearModel;
 
@@ -18,8 +18,6 @@ const ROUNDINGS: f64 = 4.0 * f64::EPSILON;
 const LOOK: usize = 16;
 /// A product of variances whose logarithm is due.
 const LARGE: f64 = 1e200;
-/// The log, the constant and the ramp.
-pub(super) const COLUMNS: usize = 3;
 
 /// Filters in progress. Lanes beyond the models repeat the last one.
 pub(super) struct Bank {
@@ -56,19 +54,6 @@ struct Scratch {
     gain: Vec<Lane>,
     matrix: Vec<Lane>,
     before: Vec<Lane>,
-}
-
-/// Samples as they enter: of the log, and of the ramp.
-#[derive(Clone, Copy)]
-pub(super) struct Samples<'a> {
-    pub(super) log: &'a [f64],
-    pub(super) ramp: &'a [f64],
-}
-
-impl Samples<'_> {
-    fn part(&self, from: usize, to: usize) -> Samples<'_> {
-        Samples { log: &self.log[from..to], ramp: self.ramp.get(from..to).unwrap_or_default() }
-    }
 }
 
 impl Bank {
@@ -400,15 +385,6 @@ impl Bank {
     pub(super) fn log_variance(&self, lane: usize) -> f64 {
         self.log_variance.0[lane] + self.count as f64 * self.r.0[lane].ln()
     }
-}
-
-#[inline(always)]
-pub(super) fn dot(a: &[Lane], b: &[Lane]) -> Lane {
-    let mut sum = Lane::ZERO;
-    for (a, b) in a.iter().zip(b) {
-        sum += *a * *b;
-    }
-    sum
 }
 
 /// A block, compiled for the instruction set at hand; results are the same for all of them.

@@ -91,3 +91,12 @@ impl MulAssign for Lane {
         *self = *self * other;
     }
 }
+
+#[inline(always)]
+pub(super) fn dot(a: &[Lane], b: &[Lane]) -> Lane {
+    let mut sum = Lane::ZERO;
+    for (a, b) in a.iter().zip(b) {
+        sum += *a * *b;
+    }
+    sum
+}

@@ -1,7 +1,22 @@
 //! The loop over samples once gains are constant.
 
-use super::bank::{COLUMNS, Samples, dot};
-use super::lane::Lane;
+use super::lane::{Lane, dot};
+
+/// The log, the constant and the ramp.
+pub(super) const COLUMNS: usize = 3;
+
+/// Samples as they enter: of the log, and of the ramp.
+#[derive(Clone, Copy)]
+pub(super) struct Samples<'a> {
+    pub(super) log: &'a [f64],
+    pub(super) ramp: &'a [f64],
+}
+
+impl Samples<'_> {
+    pub(super) fn part(&self, from: usize, to: usize) -> Samples<'_> {
+        Samples { log: &self.log[from..to], ramp: self.ramp.get(from..to).unwrap_or_default() }
+    }
+}
 
 /// Constant gains.
 pub(super) struct Settled {

@@ -21,6 +21,7 @@ use super::{Fitted, Identified, interval};
 use crate::identify::FEWEST_SAMPLES;
 use crate::noise::{Kind, NoiseModel, Term};
 use crate::numerics::distribution::{NORMAL_95, chi_square_quantile, chi_square_sf, student_quantile};
+use crate::numerics::optimize::{bracketed_root, lowest};
 use crate::params::AxisParams;
 use crate::units::digits;
 
@@ -29,8 +30,8 @@ const LEVEL: f64 = 0.01;
 /// Standard deviation of a logarithm up to which its likelihood is a parabola, and beyond which one log says too little to be held against others.
 const PARABOLA: f64 = 0.03;
 const VAGUE: f64 = 1.0;
-/// Golden steps of the search for one value for all: to 0.3 % of what the logs span.
-const STEPS: usize = 12;
+/// One value for all logs is looked for to this share of what they span: 0.1 % of the ratio.
+const WIDTH: f64 = 4e-3;
 
 /// One parameter in each of several logs.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -68,22 +69,11 @@ impl Group {
 
     /// The variance between at which Q is `target`; 0 where it is less without any.
     fn between(&self, target: f64) -> f64 {
-        let above = |between: f64| self.at(between)[2] > target;
-        if !above(0.0) {
-            return 0.0;
-        }
-        let mut high = self.variances.iter().fold(f64::MIN_POSITIVE, |most: f64, v| most.max(*v));
-        let mut rounds = 0;
-        while above(high) && rounds < 1000 {
-            high *= 2.0;
-            rounds += 1;
-        }
-        let mut low = 0.0;
-        for _ in 0..100 {
-            let middle = 0.5 * (low + high);
-            if above(middle) { low = middle } else { high = middle }
-        }
-        0.5 * (low + high)
+        let excess = |between: f64| self.at(between)[2] - target;
+        let largest = self.variances.iter().fold(f64::MIN_POSITIVE, |most: f64, v| most.max(*v));
+        let high = std::iter::successors(Some(largest), |high| Some(2.0 * high))
+            .find(|high| excess(*high) <= 0.0 || high.is_infinite());
+        high.and_then(|high| bracketed_root(excess, 0.0, high, 0.0)).unwrap_or(0.0)
     }
 }
 
@@ -259,25 +249,9 @@ fn ratio(logs: &[Log], index: usize, values: &[f64]) -> f64 {
         };
         logs.par_iter().map(of).collect::<Vec<_>>().into_iter().sum::<f64>()
     };
-    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-    let (mut low, mut high) =
-        values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-    let mut best = f64::NEG_INFINITY;
-    let (mut a, mut b) = (high - golden * (high - low), low + golden * (high - low));
-    let (mut at_a, mut at_b) = (joint(a), joint(b));
-    for _ in 0..STEPS {
-        best = best.max(at_a).max(at_b);
-        if at_a > at_b {
-            (high, b, at_b) = (b, a, at_a);
-            a = high - golden * (high - low);
-            at_a = joint(a);
-        } else {
-            (low, a, at_a) = (a, b, at_b);
-            b = low + golden * (high - low);
-            at_b = joint(b);
-        }
-    }
-    (2.0 * (apart - best.max(at_a).max(at_b))).max(0.0)
+    let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    let best = lowest(|at| -joint(at), low, high, WIDTH * (high - low));
+    (2.0 * (apart - joint(best))).max(0.0)
 }
 
 impl Between {

@@ -9,6 +9,7 @@ use super::whittle;
 use crate::filter::likelihood::{LogLikelihood, Stretch, diffuse_log_likelihoods};
 use crate::model::{InitialBias, LinearModel, sensor_errors};
 use crate::noise::{Kind, NoiseModel};
+use crate::numerics::optimize::{hessian, shifted};
 use crate::units::Quantity;
 
 /// Numbers that a step of the search may cost: samples × (states² + 4 states) × (1 + 2 parameters), some seconds in all; above, the cosine
@@ -110,7 +111,7 @@ impl<'a> Exact<'a> {
             })
             .collect();
         let steps: Vec<f64> = free.iter().map(|i| STEP * sigmas[*i]).collect();
-        let sides = free.iter().zip(&steps).flat_map(|(i, step)| [*step, -step].map(|by| moved(&at, &[(*i, by)])));
+        let sides = free.iter().zip(&steps).flat_map(|(i, step)| [*step, -step].map(|by| shifted(&at, &[(*i, by)])));
         let points: Vec<Vec<f64>> = std::iter::once(at.clone()).chain(sides).collect();
         let each = self.each(&points)?;
         let value = |logs: &Vec<LogLikelihood>| logs.iter().map(|log| log.value).sum::<f64>();
@@ -129,6 +130,8 @@ impl<'a> Exact<'a> {
     /// From the maximum on the cosine coefficients, by a quasi-Newton method that begins with their information: it is nearly that of the exact
     /// likelihood, and what its slopes tell of the difference is added (BFGS: Broyden, Fletcher, Goldfarb, Shanno 1970).
     /// Far away from the maximum that information is taken anew at every place (Fisher 1925, scoring).
+    /// Not `optimize::minimize`: that begins with a unit matrix, and every step it spends on learning goes through all
+    /// samples.
     pub(super) fn refine(&self, start: &[f64], bounds: &[(f64, f64)]) -> Option<Refined> {
         let more = self.samples() as f64 * self.data.dt / self.data.total_s();
         let expected = |at: &[f64]| whittle::expected_information(self.data, self.form, at) * more;
@@ -147,7 +150,7 @@ impl<'a> Exact<'a> {
             }
             let next = [1.0, 0.5, 0.25, 0.1].into_iter().find_map(|share| {
                 let shifts: Vec<(usize, f64)> = free.iter().zip(step.iter()).map(|(i, s)| (*i, share * s)).collect();
-                let mut next = moved(&here.at, &shifts);
+                let mut next = shifted(&here.at, &shifts);
                 next.iter_mut().zip(bounds).for_each(|(v, (low, high))| *v = v.clamp(*low, *high));
                 let place = self.look(next, bounds, &sigmas)?;
                 (place.value > here.value - ROUNDING * here.value.abs()).then_some(place)
@@ -177,34 +180,8 @@ impl<'a> Exact<'a> {
     fn information(&self, at: &[f64], value: f64, more: f64) -> DMatrix<f64> {
         let expected = whittle::expected_information(self.data, self.form, at) * more;
         // half a standard deviation: the curvature that an interval sees
-        let step = |i: usize| 0.5 / expected[(i, i)].sqrt().clamp(0.5, 1e9);
-        let pairs: Vec<(usize, usize)> = (0..at.len()).flat_map(|i| (0..=i).map(move |k| (i, k))).collect();
-        let corners = |&(i, k): &(usize, usize)| -> Vec<Vec<f64>> {
-            let (a, b) = (step(i), step(k));
-            match i == k {
-                true => [a, -a].map(|by| moved(at, &[(i, by)])).into(),
-                false => [(a, b), (a, -b), (-a, b), (-a, -b)].map(|(x, y)| moved(at, &[(i, x), (k, y)])).into(),
-            }
-        };
-        let values = self.values(&pairs.iter().flat_map(corners).collect::<Vec<_>>());
-        let mut rest = &values[..];
-        let mut take = |count: usize| {
-            let (first, later) = rest.split_at(count);
-            rest = later;
-            first
-        };
-        let mut information = DMatrix::zeros(at.len(), at.len());
-        for (i, k) in pairs {
-            let (a, b) = (step(i), step(k));
-            let second = match take(if i == k { 2 } else { 4 }) {
-                [above, below] => (2.0 * value - above - below) / (a * a),
-                [x, y, z, w] => -(x - y - z + w) / (4.0 * a * b),
-                _ => f64::NAN,
-            };
-            information[(i, k)] = second;
-            information[(k, i)] = second;
-        }
-        information
+        let steps: Vec<f64> = expected.diagonal().iter().map(|v| 0.5 / v.sqrt().clamp(0.5, 1e9)).collect();
+        -hessian(|points| self.values(points), at, value, &steps)
     }
 }
 
@@ -235,10 +212,4 @@ pub(super) fn model(form: &Form, logs: &[f64], dt: f64, span_s: f64) -> Option<L
     // the quantity names units, no numbers
     let with = |bias| sensor_errors(Quantity::AngularRate, &noise, bias, dt, span_s);
     with(None).or_else(|_| with(zero)).ok()
-}
-
-fn moved(at: &[f64], shifts: &[(usize, f64)]) -> Vec<f64> {
-    let mut next = at.to_vec();
-    shifts.iter().for_each(|(i, by)| next[*i] += by);
-    next
 }

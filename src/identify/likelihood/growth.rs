@@ -4,7 +4,7 @@
 //! probability of about half a percent: for one coefficient that may be zero ½χ²₀ + ½χ²₁ (Self & Liang 1987); more where the log has been searched for a
 //! correlation time or a frequency (Davies 1977), which is calibrated by simulation (docs/validation.md).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::{Range, RangeInclusive};
 
 use nalgebra::Complex;
@@ -164,13 +164,10 @@ fn grown(data: &Ordinates, visited: &mut Visited, mut best: Fit, orders: u8) -> 
     best
 }
 
-/// The maximum of one given form, from many starts.
+/// The maximum of one given form: each round adds that piece of it which gives the best score, from many starts.
 pub(super) fn fit(data: &Ordinates, form: &Form) -> Option<Fit> {
     let mut partial = whittle::climb_all(data, &Form::new(vec![Piece::White]), &[whittle::level(data)])?;
     let mut rest: Vec<Piece> = form.pieces().iter().copied().filter(|piece| *piece != Piece::White).collect();
-    // wideband pieces first: what is left is drift
-    let wideband = |piece: &Piece| matches!(piece, Piece::MovingAverage(_) | Piece::BandLimit(_) | Piece::Quantization);
-    rest.sort_by_key(|piece| std::cmp::Reverse(wideband(piece)));
     if let Some(Piece::BandLimit(order)) = rest.iter().find(|piece| piece.kind() == Kind::BandLimit).copied() {
         let bases = beside_drift(data, &partial).into_iter().chain([partial.clone()]);
         let starts: Vec<Start> = bases.flat_map(|base| band_limits(data, &base, order..=order)).collect();
@@ -183,18 +180,53 @@ pub(super) fn fit(data: &Ordinates, form: &Form) -> Option<Fit> {
         partial = Fit { form, logs, ..best };
         rest.retain(|piece| piece.kind() != Kind::BandLimit);
     }
-    for piece in rest {
-        let starts = starts(data, &partial, piece);
-        // a shape of many coefficients leads astray when what is new is far from its place
-        let limited = form.has(Kind::BandLimit);
-        let found = starts.par_iter().filter_map(|(form, logs, fresh)| {
-            let fresh: Vec<usize> = if limited { fresh.clone().collect() } else { vec![] };
-            let logs = if limited { whittle::climb(data, form, logs, &fresh)?.logs } else { logs.clone() };
-            whittle::climb_all(data, form, &logs).filter(limits)
-        });
-        partial = found.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))?;
+    while !rest.is_empty() {
+        // wideband pieces first: what is left is drift and lines
+        let wideband =
+            |piece: &Piece| matches!(piece, Piece::MovingAverage(_) | Piece::BandLimit(_) | Piece::Quantization);
+        let first = rest.iter().any(wideband);
+        let next: BTreeSet<Piece> = rest.iter().copied().filter(|piece| wideband(piece) == first).collect();
+        let found = next.into_iter().filter_map(|piece| Some((piece, placed(data, &partial, piece)?)));
+        let (piece, best) = found.min_by(|(_, a), (_, b)| score(a, data).total_cmp(&score(b, data)))?;
+        rest.remove(rest.iter().position(|other| *other == piece)?);
+        partial = best;
     }
     Some(partial)
+}
+
+/// The best of `base` with one piece more.
+fn placed(data: &Ordinates, base: &Fit, piece: Piece) -> Option<Fit> {
+    let starts = starts(data, base, piece);
+    // a shape of many coefficients leads astray when what is new is far from its place
+    let limited = base.form.has(Kind::BandLimit);
+    let found = starts.par_iter().filter_map(|(form, logs, fresh)| {
+        let fresh: Vec<usize> = if limited { fresh.clone().collect() } else { vec![] };
+        let logs = if limited { whittle::climb(data, form, logs, &fresh)?.logs } else { logs.clone() };
+        whittle::climb_all(data, form, &logs).filter(limits)
+    });
+    found.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
+}
+
+/// The maximum when each piece that may stand in the place of another has been taken out and placed anew, until no place is better: drift looks like
+/// a line of low frequency, and a line like a Gauss-Markov process.
+pub(super) fn replaced(data: &Ordinates, mut fit: Fit) -> Fit {
+    let moves = |piece: &Piece| !matches!(piece, Piece::White | Piece::BandLimit(_) | Piece::Ramp);
+    if fit.form.pieces().iter().filter(|piece| moves(piece)).count() < 2 {
+        return fit;
+    }
+    for _ in 0..ROUNDS {
+        let again = |at: usize| {
+            let (form, logs) = fit.form.without(&fit.logs, at);
+            placed(data, &whittle::climb_all(data, &form, &logs)?, fit.form.pieces()[at])
+        };
+        let places = (0..fit.form.pieces().len()).filter(|at| moves(&fit.form.pieces()[*at]));
+        let best = places.filter_map(again).max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood));
+        match best.filter(|best| best.log_likelihood > fit.log_likelihood + 1e-6) {
+            Some(best) => fit = best,
+            None => break,
+        }
+    }
+    fit
 }
 
 /// White noise beside some drift, which the shape of a band limit is not to follow.

@@ -9,6 +9,7 @@ use super::ordinates::Ordinates;
 use super::whittle::{self, Fit};
 use crate::noise::Kind;
 use crate::numerics::distribution::{NORMAL_90, NORMAL_95, NORMAL_99};
+use crate::numerics::optimize::covariance;
 
 /// Standard deviation of a logarithm from which the likelihood is no parabola any more; of drift parameters, and of others.
 const ROUGH: [f64; 2] = [0.03, 0.15];
@@ -207,20 +208,12 @@ pub(super) fn deviations(information: DMatrix<f64>) -> Vec<f64> {
     }
 }
 
-/// The inverse of an information matrix; None where that is singular.
-pub(super) fn covariance(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let p = information.nrows();
-    // scaled to unit diagonal: logarithms of a frequency and of a coefficient differ by many orders
-    let scale: Vec<f64> = (0..p).map(|i| information[(i, i)].abs().sqrt().max(1e-300)).collect();
-    let scaled = DMatrix::from_fn(p, p, |i, k| information[(i, k)] / (scale[i] * scale[k]));
-    let inverse = nalgebra::Cholesky::new(scaled)?.inverse();
-    Some(DMatrix::from_fn(p, p, |i, k| inverse[(i, k)] / (scale[i] * scale[k])))
-}
-
 /// Where the likelihood, maximised over all other parameters, has fallen by `level`²/2 on the side of the `first` step; within `bounds`, which hold the fit.
 /// Where it has not fallen so far, the root of twice its fall at the end (0 where it cannot be had).
 ///
 /// The signed root of the fall is nearly straight in the logarithm and is followed by secants; where it levels off, by growing steps.
+/// Not `optimize::bracketed_root`: there is no bracket before the end is met, and each place begins where the one
+/// before ended.
 fn profile(
     data: &Ordinates,
     fit: &Fit,

@@ -43,7 +43,7 @@ pub(super) use growth::{LONGEST_AVERAGE, MOST_POLES};
 use interval::{Precision, completed, drift_precisions};
 use names::{name_of, parameter_name, term_name, unit_of};
 use ordinates::Ordinates;
-use whittle::Fit;
+use whittle::{FAST, Fit};
 use words::Words;
 
 /// Points of the shown Allan curve per decade of averaging time.
@@ -54,8 +54,6 @@ const CLOSE: f64 = 6.0;
 const CLEARLY: f64 = 3.0;
 /// Candidates whose parameters are looked at, at most.
 const LOOKED_AT: usize = 12;
-/// A Gauss-Markov process that forgets within so many samples is a matter of the sensor's bandwidth, not drift.
-const FAST: f64 = 10.0;
 /// Candidates that are tried on the part of the log they have not seen.
 const HELD_OUT: usize = 6;
 /// Standard deviation of a logarithm below which second differences of the exact likelihood give its interval.
@@ -290,10 +288,12 @@ fn fits(data: &Ordinates, choice: &ModelChoice) -> Vec<(Fit, Vec<Precision>)> {
         }
         ModelChoice::Terms { kinds, average, order } => {
             let forms = forms(kinds, *average, *order);
-            let fits = forms.par_iter().filter_map(|form| growth::fit(data, form));
-            let mut fits: Vec<(Fit, Vec<Precision>)> = fits.map(known).collect();
-            fits.sort_by(|a, b| score(&a.0, data).total_cmp(&score(&b.0, data)));
-            fits
+            let mut fits: Vec<Fit> = forms.par_iter().filter_map(|form| growth::fit(data, form)).collect();
+            let by_score = |a: &Fit, b: &Fit| score(a, data).total_cmp(&score(b, data));
+            fits.sort_by(by_score);
+            fits.iter_mut().take(LOOKED_AT).for_each(|fit| *fit = growth::replaced(data, fit.clone()));
+            fits.sort_by(by_score);
+            fits.into_par_iter().map(known).collect()
         }
     }
 }

@@ -6,15 +6,16 @@
 //! For a Gauss-Markov process the standard deviations are below those of the exact Gaussian information by up to about 0.9 Tc/T of themselves.
 //! Source: Whittle 1953; Kay 1993, section 3.11.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::super::shape::Role;
 use super::form::Form;
-use super::interval::covariance;
 use super::names::name_of;
 use super::ordinates::Ordinates;
 use super::{parameter_name, whittle};
 use crate::noise::{Grid, Kind, NoiseModel, Term};
+use crate::numerics::optimize::covariance;
 use crate::signal::lines::Line;
 
 /// The longest log that is thought of: ten years, s.
@@ -29,7 +30,7 @@ const LARGEST_ZERO: f64 = 0.98;
 const SHAPE: f64 = 0.01;
 
 /// How the samples of a log are made of those of the sensor.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Thinning {
     /// Means of consecutive samples.

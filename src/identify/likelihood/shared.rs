@@ -1,5 +1,7 @@
 //! Whether the axes of a sensor have one correlation time: their likelihoods, each at its best but for that time, side by side.
 
+use std::convert::Infallible;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -8,6 +10,7 @@ use super::ordinates::Ordinates;
 use super::whittle::{self, Fit};
 use crate::noise::Kind;
 use crate::numerics::distribution::{NORMAL_95, chi_square_sf};
+use crate::numerics::optimize::{bisect, half_way, lowest};
 
 /// The likelihood of one axis as a function of the correlation time of its only Gauss-Markov process.
 #[derive(Clone, Debug)]
@@ -71,36 +74,18 @@ pub fn shared_time(axes: &[&TimeProfile]) -> Option<SharedTime> {
     let joint =
         |ln_time: f64| axes.par_iter().map(|axis| axis.at(ln_time)).collect::<Vec<_>>().into_iter().sum::<f64>();
     let times = || axes.iter().map(|axis| axis.ln_time());
-    let (mut low, mut high) = (times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max));
-    // the best common time is between those of the axes; golden section
-    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-    let (mut a, mut b) = (high - golden * (high - low), low + golden * (high - low));
-    let (mut at_a, mut at_b) = (joint(a), joint(b));
-    while high - low > CLOSE {
-        if at_a > at_b {
-            (high, b, at_b) = (b, a, at_a);
-            a = high - golden * (high - low);
-            at_a = joint(a);
-        } else {
-            (low, a, at_a) = (a, b, at_b);
-            b = low + golden * (high - low);
-            at_b = joint(b);
-        }
-    }
-    let best = 0.5 * (low + high);
+    let (low, high) = (times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max));
+    // the best common time is between those of the axes
+    let best = lowest(|ln_time| -joint(ln_time), low, high, CLOSE);
     let top = joint(best);
     let apart: f64 = axes.iter().map(|axis| axis.at(axis.ln_time())).sum();
     let ratio = (2.0 * (apart - top)).max(0.0);
     let fallen = |ln_time: f64| 2.0 * (top - joint(ln_time)) > NORMAL_95 * NORMAL_95;
     let limit = |side: f64| {
-        let (mut near, mut far) = (0.0, FAR);
-        if !fallen(best + side * far) {
+        if !fallen(best + side * FAR) {
             return None;
         }
-        while far - near > 10.0 * CLOSE {
-            let middle = 0.5 * (near + far);
-            if fallen(best + side * middle) { far = middle } else { near = middle }
-        }
+        let Ok((_, far)) = bisect(0.0, FAR, half_way(10.0 * CLOSE), |at| Ok::<_, Infallible>(fallen(best + side * at)));
         Some((best + side * far).exp())
     };
     Some(SharedTime {

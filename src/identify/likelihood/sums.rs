@@ -3,12 +3,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::FAST;
-use super::interval;
 use super::ordinates::Ordinates;
-use super::whittle::{self, Fit};
+use super::whittle::{self, FAST, Fit};
 use crate::noise::{Kind, Term};
 use crate::numerics::distribution::NORMAL_95;
+use crate::numerics::optimize::covariance;
 
 /// SI, with its 95 % interval by the delta method on the logarithm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,7 +39,7 @@ const STEP: f64 = 1e-4;
 /// `information`: of the logarithms, where it is better known than by the cosine coefficients.
 pub(super) fn sums(data: &Ordinates, fit: &Fit, information: Option<&DMatrix<f64>>) -> Sums {
     let information = information.cloned().unwrap_or_else(|| whittle::observed_information(data, fit));
-    let covariance = interval::covariance(&information);
+    let covariance = covariance(&information);
     let sum = |square: &dyn Fn(&[f64]) -> f64| root(square, &fit.logs, covariance.as_ref());
     // which drift is fast is decided once, not anew at every step
     let fast: Vec<bool> = fit.form.terms(&fit.logs).map(|term| counts_as_white(&term, data.dt)).collect();

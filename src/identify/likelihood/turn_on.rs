@@ -15,7 +15,7 @@ pub(super) struct Spread {
     pub(super) interval: [f64; 2],
 }
 
-/// Points of the search over ln σ.
+/// Points of the search over ln σ: a grid, for the likelihood of few logs may have two maxima.
 const POINTS: usize = 4000;
 
 /// Restricted maximum likelihood of σ, interval where 2 ln L has fallen by χ²₁(0.95); `None` for fewer than two logs.

@@ -7,18 +7,19 @@
 //! Sources: Whittle 1953; Kay 1993, section 3.11 (asymptotic bound).
 
 use nalgebra::{DMatrix, DVector};
-use slsqp::{Func, StopTols, minimize};
 
 use super::super::shape::Role;
-use super::FAST;
 use super::form::{Form, Piece};
 use super::ordinates::Ordinates;
 use crate::noise::{Kind, Term};
+use crate::numerics::optimize::{Look, Optimum, Problem, minimize};
 
 /// The correlation time of a line is at least this many samples.
 const SHORTEST: f64 = 0.3;
 /// That of a drift; what is shorter is wideband noise: white, and averaged by the sensor.
 const SHORTEST_DRIFT: f64 = 2.0;
+/// A Gauss-Markov process that forgets within so many samples is a matter of the sensor's bandwidth, not drift.
+pub(super) const FAST: f64 = 10.0;
 /// Beside a band limit a drift that forgets sooner is part of the filter; a line may be as wide as what is no drift elsewhere, [`FAST`]: what is not allowed to be one wide line
 /// becomes several, each as wide as it may be. That a filter's own resonance is no line is a matter of cost.
 pub(super) const WIDE_LINE: f64 = 30.0;
@@ -378,59 +379,39 @@ pub(super) fn climb_within(
     if scored {
         scoring(data, form, &mut at, &held, free, bounds);
     }
-    let mut best = objective(data, form, &at, &held, None);
-    let rounds = if scored || free.is_empty() { 0 } else { 8 };
-    for _ in 0..rounds {
-        let information = information(data, form, &at, &held);
-        let scale: Vec<f64> = free.iter().map(|i| 1.0 / information[(*i, *i)].sqrt().clamp(1.0, 1e8)).collect();
-        let place = |x: &[f64]| {
-            let mut logs = at.clone();
-            for ((i, x), s) in free.iter().zip(x).zip(&scale) {
-                logs[*i] = x * s;
-            }
-            logs
-        };
-        let f = |x: &[f64], gradient: Option<&mut [f64]>, _: &mut ()| {
-            let logs = place(x);
-            let value = match gradient {
-                Some(gradient) => {
-                    let mut whole = vec![0.0; logs.len()];
-                    let value = objective(data, form, &logs, &held, Some(&mut whole));
-                    for ((g, i), s) in gradient.iter_mut().zip(free).zip(&scale) {
-                        *g = whole[*i] * s;
-                    }
-                    value
-                }
-                None => objective(data, form, &logs, &held, None),
-            };
-            if value.is_finite() { value } else { f64::MAX.sqrt() }
-        };
-        let x: Vec<f64> = free.iter().zip(&scale).map(|(i, s)| at[*i] / s).collect();
-        let limits: Vec<(f64, f64)> =
-            free.iter().zip(&scale).map(|(i, s)| (bounds[*i].0 / s, bounds[*i].1 / s)).collect();
-        let none: [&dyn Func<()>; 0] = [];
-        let tolerances = StopTols { ftol_abs: 1e-6, ftol_rel: 1e-14, ..StopTols::default() };
-        let (x, value) = match minimize(f, &x, &limits, &none, (), 100, Some(tolerances)) {
-            Ok((_, x, value)) | Err((_, x, value)) => (x, value),
-        };
-        let next = place(&x);
-        if !value.is_finite() || next.iter().any(|v| !v.is_finite()) {
-            break;
-        }
-        let gain = best - value;
-        if gain > 0.0 {
-            best = value;
-            at = next;
-        }
-        if gain < 1e-5 {
-            break;
-        }
-    }
+    let place = |x: &[f64]| {
+        let mut logs = at.clone();
+        free.iter().zip(x).for_each(|(i, x)| logs[*i] = *x);
+        logs
+    };
+    let look = |x: &[f64], _: &[f64], sloped: bool| {
+        let logs = place(x);
+        let mut gradient = vec![0.0; if sloped { logs.len() } else { 0 }];
+        let value = objective(data, form, &logs, &held, sloped.then_some(&mut gradient[..]));
+        let slopes = if sloped { vec![free.iter().map(|i| gradient[*i]).collect()] } else { vec![] };
+        Look { values: vec![value], slopes }
+    };
+    let scale = |x: &[f64], _| {
+        let information = information(data, form, &place(x), &held);
+        free.iter().map(|i| 1.0 / information[(*i, *i)].sqrt().clamp(1.0, 1e8)).collect()
+    };
+    let problem = Problem {
+        look: &look,
+        scale: &scale,
+        start: objective(data, form, &at, &held, None),
+        rounds: if scored { 0 } else { 8 },
+        ..Problem::default()
+    };
+    let start: Vec<f64> = free.iter().map(|i| at[*i]).collect();
+    let limits: Vec<(f64, f64)> = free.iter().map(|i| bounds[*i]).collect();
+    let Optimum { x, f: best, .. } = minimize(&problem, &start, &limits);
+    let at = place(&x);
     best.is_finite().then(|| finish(data, form, at, best, free, bounds))
 }
 
 /// Steps of Fisher's scoring, damped (Levenberg 1944, Marquardt 1963), until another would gain less than [`SCORED`]: coefficients of a filter go together as no
 /// search that has to learn it from slopes can know. How far it is from the end is told by the decrement.
+/// Not `optimize::minimize`, which would have to learn them.
 fn scoring(data: &Ordinates, form: &Form, at: &mut [f64], held: &Held, free: &[usize], bounds: &[(f64, f64)]) {
     let mut damping = 1e-2;
     let mut value = objective(data, form, at, held, None);

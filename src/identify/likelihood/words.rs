@@ -12,6 +12,7 @@ use super::ordinates::Ordinates;
 use super::whittle::{self, Fit};
 use crate::noise::{Kind, Term};
 use crate::numerics::distribution::{NORMAL_90, NORMAL_95};
+use crate::numerics::optimize::bracketed_root;
 use crate::params::{Measured, NotIdentified};
 use crate::units::{Unit, digits};
 
@@ -154,15 +155,7 @@ impl Words<'_> {
             let (form, logs, _) = fit.form.with(&fit.logs, Piece::RandomWalk, &[log]);
             2.0 * (without - whittle::log_likelihood(self.data, &form, &logs)) - NORMAL_90.powi(2)
         };
-        let (mut low, mut high) = (touch - 9.0, touch + 6.0);
-        if fall(high).is_nan() || fall(high) <= 0.0 {
-            return None;
-        }
-        for _ in 0..60 {
-            let middle = 0.5 * (low + high);
-            if fall(middle) < 0.0 { low = middle } else { high = middle }
-        }
-        Some(high.exp())
+        bracketed_root(fall, touch - 9.0, touch + 6.0, 1e-9).map(f64::exp)
     }
 
     pub(super) fn warnings(&self, fit: &Fit, p_value: f64) -> Vec<String> {

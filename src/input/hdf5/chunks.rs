@@ -5,8 +5,7 @@ use std::collections::BTreeSet;
 use super::super::account::{STEP, deeper};
 use super::super::bytes::Bytes;
 use super::datatype::Datatype;
-use super::filters;
-use super::object::Dataset;
+use super::filters::{self, Filter};
 use super::{NOWHERE, Store};
 
 #[derive(Clone, Debug)]
@@ -294,4 +293,13 @@ fn spread(data: &[u8], size: u64, second: u64, from: u64, put: &mut dyn FnMut(u6
     for (i, element) in (from..).zip(data.chunks_exact(size as usize)) {
         put(i / second, i % second, element);
     }
+}
+
+/// A dataset as its header describes it.
+#[derive(Clone, Debug)]
+pub(super) struct Dataset {
+    pub(super) shape: Vec<u64>,
+    pub(super) datatype: Datatype,
+    pub(super) layout: Layout,
+    pub(super) filters: Vec<Filter>,
 }

@@ -2,21 +2,12 @@
 
 use super::super::account::{LONGEST_NAME, STEP, deeper};
 use super::super::bytes::Bytes;
-use super::chunks::Layout;
+use super::chunks::{Dataset, Layout};
 use super::datatype::{Datatype, Element};
-use super::filters::{self, Filter};
+use super::filters;
 use super::{MOST_OBJECTS, NOWHERE, Store};
 
 const LONGEST_HEAP: u64 = 1 << 16;
-
-/// A dataset as its header describes it.
-#[derive(Clone, Debug)]
-pub(super) struct Dataset {
-    pub(super) shape: Vec<u64>,
-    pub(super) datatype: Datatype,
-    pub(super) layout: Layout,
-    pub(super) filters: Vec<Filter>,
-}
 
 impl Dataset {
     /// Bytes in memory, about.

@@ -4,9 +4,6 @@
 //! division or product is correctly rounded (Clinger 1990, "How to read floating point numbers accurately"). Otherwise, for |e| ≤ 27,
 //! 5^|e| fits into 64 bits, so m·5^e or the first 62 bits of m/5^|e| and whether anything follows are found in integers and rounded once.
 
-#[cfg(target_arch = "x86_64")]
-use super::eights;
-
 /// Bytes that must stand before a digit that is read.
 pub(super) const LEAD: usize = 32;
 /// 10^e and 5^e are known up to here.
@@ -166,50 +163,6 @@ impl Bytes for pulp::x86::V3 {
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-impl Bytes for pulp::x86::V4 {
-    #[inline(always)]
-    fn ends(self, block: &[u8; 64], separators: [u8; 2]) -> (u64, u64, u64) {
-        let block = pulp::cast(*block);
-        let is = |byte: u8| self.avx512bw._mm512_cmpeq_epi8_mask(block, self.avx512f._mm512_set1_epi8(byte as i8));
-        let feeds = is(b'\n');
-        (is(separators[0]) | is(separators[1]) | feeds, feeds, is(b'"'))
-    }
-    #[inline(always)]
-    fn others(self, text: &[u8; 32]) -> u32 {
-        let moved = self.avx2._mm256_sub_epi8(pulp::cast(*text), self.avx._mm256_set1_epi8(b'0' as i8));
-        self.avx512bw._mm256_cmpgt_epu8_mask(moved, self.avx._mm256_set1_epi8(9))
-    }
-    #[inline(always)]
-    fn sixteen(self, text: &[u8; 16], count: usize) -> u64 {
-        (*self).sixteen(text, count)
-    }
-    #[inline(always)]
-    fn places(self, bits: u64, at: u32, places: &mut [u32; 80]) {
-        eights::places(self, bits, at, places);
-    }
-    #[inline(always)]
-    fn numbers(self, fields: &Eight, point: u8) -> Option<Numbers> {
-        Some(eights::numbers(self, fields, point))
-    }
-    #[inline(always)]
-    fn stamps(self, fields: &Eight, point: u8, origin: (i64, f64)) -> Option<Numbers> {
-        Some(eights::stamps(self, fields, point, origin))
-    }
-}
-
-/// All bits of the last bytes, so many.
-#[cfg(target_arch = "x86_64")]
-const fn keep() -> [[u8; 16]; 17] {
-    let mut table = [[0; 16]; 17];
-    let mut count = 1;
-    while count <= 16 {
-        table[count] = (u128::MAX << (128 - 8 * count)).to_le_bytes();
-        count += 1;
-    }
-    table
-}
-
 /// The last `count` (at most 8) bytes before `end`, which are digits, as a number. The digits stand in one word, the last in its highest
 /// byte; neighbours are joined to numbers of 2, 4 and 8 digits (Lemire 2021, "Number parsing at a gigabyte per second", section 6).
 #[inline(always)]
@@ -338,4 +291,16 @@ fn rounded(q: u128, more: bool, e: i32) -> f64 {
     let up = rest > half || (rest == half && (more || kept & 1 == 1));
     let two = f64::from_bits(((1023 + e + drop as i32) as u64) << 52);
     (kept + u64::from(up)) as f64 * two
+}
+
+/// All bits of the last bytes, so many.
+#[cfg(target_arch = "x86_64")]
+const fn keep() -> [[u8; 16]; 17] {
+    let mut table = [[0; 16]; 17];
+    let mut count = 1;
+    while count <= 16 {
+        table[count] = (u128::MAX << (128 - 8 * count)).to_le_bytes();
+        count += 1;
+    }
+    table
 }

@@ -4,7 +4,7 @@
 //! words when the lower bytes are cleared; the digits before it are brought to the same place by shifts. Neighbours are joined to numbers
 //! of 2, 4 and 8 digits as in `digits::eight`.
 
-use super::digits::{Eight, Numbers};
+use super::digits::{Bytes, Eight, Numbers};
 use pulp::x86::V4;
 use std::arch::x86_64::{__m512d, __m512i, _CMP_LT_OQ};
 
@@ -25,7 +25,7 @@ struct Lanes(V4);
 
 /// whole + fraction/10^count, rounded once.
 #[inline(always)]
-pub(super) fn numbers(simd: V4, eight: &Eight, point: u8) -> Numbers {
+fn read_numbers(simd: V4, eight: &Eight, point: u8) -> Numbers {
     let lanes = Lanes(simd);
     let Decimals { negative, good, whole, fraction, ten } = lanes.decimals(eight, point);
     let V4 { avx512f: f, avx512dq: dq, .. } = simd;
@@ -37,7 +37,7 @@ pub(super) fn numbers(simd: V4, eight: &Eight, point: u8) -> Numbers {
 
 /// Since `origin`, an integer and what is behind its point: (whole − integer) + (fraction/10^count − what is behind).
 #[inline(always)]
-pub(super) fn stamps(simd: V4, eight: &Eight, point: u8, origin: (i64, f64)) -> Numbers {
+fn read_stamps(simd: V4, eight: &Eight, point: u8, origin: (i64, f64)) -> Numbers {
     let lanes = Lanes(simd);
     let Decimals { negative, good, whole, fraction, ten } = lanes.decimals(eight, point);
     let V4 { avx512f: f, avx512dq: dq, .. } = simd;
@@ -138,7 +138,7 @@ const MORE: [f64; 8] = [1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
 
 /// The places of the bits that are set, behind `at`.
 #[inline(always)]
-pub(super) fn places(simd: V4, bits: u64, at: u32, places: &mut [u32; 80]) {
+fn write_places(simd: V4, bits: u64, at: u32, places: &mut [u32; 80]) {
     const FIRST: [u32; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
     let f = simd.avx512f;
     let mut count = 0;
@@ -148,5 +148,36 @@ pub(super) fn places(simd: V4, bits: u64, at: u32, places: &mut [u32; 80]) {
         let Some(room) = places[count..].first_chunk_mut::<16>() else { return };
         *room = pulp::cast(f._mm512_maskz_compress_epi32(some, all));
         count += some.count_ones() as usize;
+    }
+}
+
+impl Bytes for V4 {
+    #[inline(always)]
+    fn ends(self, block: &[u8; 64], separators: [u8; 2]) -> (u64, u64, u64) {
+        let block = pulp::cast(*block);
+        let is = |byte: u8| self.avx512bw._mm512_cmpeq_epi8_mask(block, self.avx512f._mm512_set1_epi8(byte as i8));
+        let feeds = is(b'\n');
+        (is(separators[0]) | is(separators[1]) | feeds, feeds, is(b'"'))
+    }
+    #[inline(always)]
+    fn others(self, text: &[u8; 32]) -> u32 {
+        let moved = self.avx2._mm256_sub_epi8(pulp::cast(*text), self.avx._mm256_set1_epi8(b'0' as i8));
+        self.avx512bw._mm256_cmpgt_epu8_mask(moved, self.avx._mm256_set1_epi8(9))
+    }
+    #[inline(always)]
+    fn sixteen(self, text: &[u8; 16], count: usize) -> u64 {
+        (*self).sixteen(text, count)
+    }
+    #[inline(always)]
+    fn places(self, bits: u64, at: u32, places: &mut [u32; 80]) {
+        write_places(self, bits, at, places);
+    }
+    #[inline(always)]
+    fn numbers(self, fields: &Eight, point: u8) -> Option<Numbers> {
+        Some(read_numbers(self, fields, point))
+    }
+    #[inline(always)]
+    fn stamps(self, fields: &Eight, point: u8, origin: (i64, f64)) -> Option<Numbers> {
+        Some(read_stamps(self, fields, point, origin))
     }
 }

@@ -23,6 +23,7 @@ use super::stamps::Count;
 use super::windows::{Extent, Windows, surely_quiet};
 use super::{InputKind, Note, Place, Places, unlikely};
 use crate::numerics::distribution::chi_square_quantile;
+use crate::numerics::optimize::bracketed_root;
 use crate::numerics::reduce::Moments;
 use crate::units::{LARGEST, Quantity, Unit};
 
@@ -512,12 +513,8 @@ fn largest_by_chance(quartile: f64, windows: usize) -> f64 {
     if quartile.is_nan() || quartile >= ratio(MANY) {
         return 0.0;
     }
-    let (mut low, mut high) = (1.0, MANY);
-    for _ in 0..20 {
-        let middle: f64 = (low * high).sqrt();
-        if ratio(middle) < quartile { low = middle } else { high = middle }
-    }
-    chi_square_quantile(1.0 - 1e-6 / windows as f64, 1.0) / low.sqrt() * low / chi_square_quantile(0.5, low)
+    let dof = bracketed_root(|ln| ratio(ln.exp()) - quartile, 0.0, MANY.ln(), 1e-6).map_or(1.0, f64::exp);
+    chi_square_quantile(1.0 - 1e-6 / windows as f64, 1.0) / dof.sqrt() * dof / chi_square_quantile(0.5, dof)
 }
 
 fn are<'a>(count: u64, one: &'a str, many: &'a str) -> &'a str {

@@ -15,7 +15,7 @@ pub(super) struct Windows {
     pub(super) done: Vec<(Moments, Place)>,
     /// Of each of them.
     within: Vec<Within>,
-    open: (Moments, Within),
+    open: Piece,
     start: Option<Place>,
     /// The beginning of a piece, and where.
     piece: Vec<f64>,
@@ -31,13 +31,30 @@ struct Within {
 }
 
 impl Within {
-    #[inline(always)]
-    fn of(x: &[f64], moments: &Moments) -> Within {
-        Within { distances: by_eight(x, |v| (v - moments.mean).abs()), squares: moments.squares() }
-    }
     fn merge(&mut self, other: &Within) {
         self.distances += other.distances;
         self.squares += other.squares;
+    }
+}
+
+/// What is kept of consecutive values.
+#[derive(Clone, Copy, Debug, Default)]
+struct Piece {
+    moments: Moments,
+    within: Within,
+}
+
+impl Piece {
+    /// Inlined where the processor can do more at once.
+    #[inline(always)]
+    fn of(x: &[f64]) -> Piece {
+        let moments = Moments::of(x);
+        let distances = by_eight(x, |v| (v - moments.mean).abs());
+        Piece { moments, within: Within { distances, squares: moments.squares() } }
+    }
+    fn merge(&mut self, other: &Piece) {
+        self.moments.merge(&other.moments);
+        self.within.merge(&other.within);
     }
 }
 
@@ -45,7 +62,7 @@ impl Windows {
     pub(super) fn new() -> Self {
         let at = Place { index: 0, time_s: f64::NAN };
         let piece = Vec::with_capacity(PIECE);
-        let open = Default::default();
+        let open = Piece::default();
         Windows { size: PIECE as u64, done: Vec::new(), within: Vec::new(), open, start: None, piece, at }
     }
 
@@ -53,7 +70,7 @@ impl Windows {
     pub(super) fn add_all(&mut self, mut x: &[f64], mut places: Places) {
         while !x.is_empty() {
             let taken = if self.piece.is_empty() && x.len() >= PIECE {
-                self.close(&x[..PIECE], places.at(0));
+                self.close(Piece::of(&x[..PIECE]), places.at(0));
                 PIECE
             } else {
                 if self.piece.is_empty() {
@@ -62,10 +79,8 @@ impl Windows {
                 let taken = x.len().min(PIECE - self.piece.len());
                 self.piece.extend_from_slice(&x[..taken]);
                 if self.piece.len() == PIECE {
-                    let mut piece = std::mem::take(&mut self.piece);
-                    self.close(&piece, self.at);
-                    piece.clear();
-                    self.piece = piece;
+                    self.close(Piece::of(&self.piece), self.at);
+                    self.piece.clear();
                 }
                 taken
             };
@@ -74,13 +89,11 @@ impl Windows {
     }
 
     #[inline(never)]
-    fn close(&mut self, piece: &[f64], at: Place) {
-        let moments = Moments::of(piece);
+    fn close(&mut self, piece: Piece, at: Place) {
         let start = *self.start.get_or_insert(at);
-        self.open.0.merge(&moments);
-        self.open.1.merge(&Within::of(piece, &moments));
-        if self.open.0.count == self.size {
-            let (moments, within) = std::mem::take(&mut self.open);
+        self.open.merge(&piece);
+        if self.open.moments.count == self.size {
+            let Piece { moments, within } = std::mem::take(&mut self.open);
             self.done.push((moments, start));
             self.within.push(within);
             self.start = None;
@@ -102,8 +115,9 @@ impl Windows {
         }
     }
 
-    /// The variance of each window as of normal values: π/2 times the square of the mean distance from the means of its pieces, and the variance of those. A few
-    /// values that are far away, which are no motion, weigh by their distance and not by its square.
+    /// The variance of each window as of normal values: π/2 times the square of the mean distance from the means of its
+    /// pieces, and the variance of those. A few values that are far away, which are no motion, weigh by their distance
+    /// and not by its square.
     pub(super) fn variances(&self) -> Vec<f64> {
         let of = |((moments, _), within): (&(Moments, Place), &Within)| {
             let distance = within.distances / moments.count as f64;

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{ObjectiveError, Problem};
 use crate::numerics::linalg::cholesky;
+use crate::numerics::optimize::covariance;
 use crate::numerics::random::{StreamId, fill_normal, stream};
 use crate::tune::parameters::{Group, Prior};
 
@@ -116,8 +117,6 @@ fn correlations(problem: &Problem<'_>, axis: usize) -> Option<(Vec<usize>, DMatr
     let sum = |a: &[f64], b: &[f64]| (0..count).map(|k| frequency(k) * a[k] * b[k]).sum::<f64>();
     let n = numbers.len();
     let information = DMatrix::from_fn(n, n, |i, j| sum(&derivatives[i], &derivatives[j]));
-    let scale = information.diagonal().map(f64::sqrt);
-    let scaled = DMatrix::from_fn(n, n, |i, j| information[(i, j)] / (scale[i] * scale[j]));
-    let inverse = nalgebra::Cholesky::new(scaled)?.inverse();
+    let inverse = covariance(&information)?;
     Some((numbers, DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] / (inverse[(i, i)] * inverse[(j, j)]).sqrt())))
 }

@@ -1,14 +1,13 @@
 //! Physical parameters refined on logs: the maximum of innovation likelihood times prior.
 
-use nalgebra::DMatrix;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
-use slsqp::{Func, StopTols, minimize};
 
 use super::{Found, Log, ObjectiveError, Problem};
 use crate::filter::innovations::{log_likelihood, log_likelihoods};
 use crate::model::LinearModel;
+use crate::numerics::optimize::{self, Optimum, covariance, hessian, look, minimize, shifted};
 use crate::tune::parameters::Group;
 use crate::units::digits;
 
@@ -20,8 +19,7 @@ const FEWEST_SAMPLES: usize = 100;
 const REACH: f64 = 6.907_755_278_982_137;
 /// Step of numerical derivatives in standard deviations of what the logs say.
 const STEP: f64 = 0.02;
-/// Restarts at most; the search ends when one gains less in ln L.
-const RESTARTS: usize = 8;
+/// The search ends when a restart gains less in ln L.
 const ENOUGH: f64 = 1e-7;
 /// Bounds of the standard deviations by which logarithms are scaled.
 const SCALES: (f64, f64) = (1e-6, 1.0);
@@ -194,45 +192,27 @@ impl Search<'_> {
         sums.into_iter().zip(points).map(finite).collect()
     }
 
-    fn value(&self, shifts: &[f64]) -> f64 {
-        self.values(&[shifts.to_vec()])[0]
-    }
-
     /// Shifts at the maximum, and standard deviations from the second differences there.
     fn run(&self) -> Result<(Vec<f64>, Vec<Option<f64>>), ObjectiveError> {
         let n = self.group.free.len();
-        let mut at = vec![0.0; n];
+        let nominal = vec![0.0; n];
         // a model that cannot be built says so
-        let mut best = self.of_logs(&at)? + self.of_priors(&at);
-        for _ in 0..RESTARTS {
-            let scale = self.scales(&at, best);
-            let place = |x: &[f64]| -> Vec<f64> { x.iter().zip(&scale).map(|(x, s)| x * s).collect() };
-            let f = |x: &[f64], slope: Option<&mut [f64]>, _: &mut ()| {
-                if let Some(slope) = slope {
-                    let sides = (0..n).flat_map(|k| [STEP, -STEP].map(|step| place(&shifted(x, &[(k, step)]))));
-                    let values = self.values(&sides.collect::<Vec<_>>());
-                    let of = |pair: &[f64]| -(pair[0] - pair[1]) / (2.0 * STEP);
-                    slope.iter_mut().zip(values.chunks_exact(2)).for_each(|(slope, pair)| *slope = of(pair));
-                }
-                -self.value(&place(x))
-            };
-            let start: Vec<f64> = at.iter().zip(&scale).map(|(v, s)| v / s).collect();
-            let bounds: Vec<(f64, f64)> = scale.iter().map(|s| (-REACH / s, REACH / s)).collect();
-            let none: [&dyn Func<()>; 0] = [];
-            let tolerances = StopTols { ftol_abs: 0.1 * ENOUGH, ..StopTols::default() };
-            let (x, value) = match minimize(f, &start, &bounds, &none, (), 100, Some(tolerances)) {
-                Ok((_, x, value)) | Err((_, x, value)) => (x, -value),
-            };
-            let gain = value - best;
-            if gain > 0.0 && x.iter().all(|v| v.is_finite()) {
-                (best, at) = (value, place(&x));
-            }
-            if gain < ENOUGH {
-                break;
-            }
-        }
-        let std_devs = self.std_devs(&at, best);
-        Ok((at, std_devs))
+        let best = self.of_logs(&nominal)? + self.of_priors(&nominal);
+        let values = |points: &[Vec<f64>]| self.values(points).into_iter().map(|value| vec![-value]).collect();
+        let look = |at: &[f64], scale: &[f64], sloped: bool| {
+            look(values, at, &scale.iter().map(|s| STEP * s).collect::<Vec<_>>(), sloped)
+        };
+        let problem = optimize::Problem {
+            look: &look,
+            scale: &|at, value| self.scales(at, -value),
+            start: -best,
+            f_abs: 0.1 * ENOUGH,
+            worth: ENOUGH,
+            ..optimize::Problem::default()
+        };
+        let Optimum { x, f, .. } = minimize(&problem, &nominal, &vec![(-REACH, REACH); n]);
+        let std_devs = self.std_devs(&x, -f);
+        Ok((x, std_devs))
     }
 
     /// Standard deviation of each logarithm alone, from the curvature.
@@ -259,36 +239,9 @@ impl Search<'_> {
 
     /// Of the logarithms, from the inverse of the matrix of second differences; `None` where the maximum is flat.
     fn std_devs(&self, at: &[f64], value: f64) -> Vec<Option<f64>> {
-        let n = at.len();
-        let step: Vec<f64> = self.scales(at, value).iter().map(|s| 0.5 * s).collect();
-        let pairs: Vec<(usize, usize)> = (0..n).flat_map(|i| (0..=i).map(move |k| (i, k))).collect();
-        let corners = |&(i, k): &(usize, usize)| {
-            let signs: &[(f64, f64)] =
-                if i == k { &[(1.0, 0.0), (-1.0, 0.0)] } else { &[(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] };
-            signs.iter().map(move |(a, b)| (i, k, *a, *b))
-        };
-        let points =
-            pairs.iter().flat_map(corners).map(|(i, k, a, b)| shifted(at, &[(i, a * step[i]), (k, b * step[k])]));
-        let values = self.values(&points.collect::<Vec<_>>());
-        let mut rest = &values[..];
-        let mut information = DMatrix::zeros(n, n);
-        for (i, k) in pairs {
-            let (own, later) = rest.split_at(if i == k { 2 } else { 4 });
-            rest = later;
-            let second = match own {
-                [above, below] => 2.0 * value - above - below,
-                [x, y, z, w] => -0.25 * (x - y - z + w),
-                _ => f64::NAN,
-            };
-            (information[(i, k)], information[(k, i)]) = (second, second);
-        }
-        match nalgebra::Cholesky::new(information) {
-            Some(factor) => {
-                let covariance = factor.inverse();
-                (0..n).map(|k| Some(covariance[(k, k)].sqrt() * step[k])).collect()
-            }
-            None => vec![None; n],
-        }
+        let steps: Vec<f64> = self.scales(at, value).iter().map(|s| 0.5 * s).collect();
+        let known = covariance(&-hessian(|points| self.values(points), at, value, &steps));
+        (0..at.len()).map(|k| known.as_ref().map(|known| known[(k, k)].sqrt())).collect()
     }
 
     fn held_out(&self, log: &Log, before: &[f64], after: &[f64]) -> Result<LikelihoodLog, ObjectiveError> {
@@ -309,10 +262,4 @@ impl Search<'_> {
             held_out: rest(after)?,
         })
     }
-}
-
-fn shifted(at: &[f64], shifts: &[(usize, f64)]) -> Vec<f64> {
-    let mut next = at.to_vec();
-    shifts.iter().for_each(|(k, by)| next[*k] += by);
-    next
 }

@@ -5,19 +5,17 @@
 //! below that of its true error, by the exact covariance of the mismatched filter. The parameters are those of least mean ln(true sigma) among
 //! those that are honest for 95 % of the sensors and within the joint 99.7 % region of what was identified (an ellipsoid of χ²).
 
-use std::cell::RefCell;
-
 use nalgebra::DVector;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
-use slsqp::{Func, StopTols, minimize};
 
 use super::belief::Belief;
 use super::settled::{Settled, Truth};
 use super::{Found, ObjectiveError, Problem};
 use crate::model::LinearModel;
 use crate::numerics::distribution::chi_square_quantile;
+use crate::numerics::optimize::{self, bisect, half_way, look, minimize};
 use crate::tune::TuneError;
 use crate::tune::parameters::Group;
 
@@ -37,9 +35,10 @@ const TIE: f64 = 1e-4;
 const STEP: f64 = 0.05;
 /// Half width of the window of shares whose order statistics are averaged to a quantile.
 const WINDOW: f64 = 0.02;
-/// Evaluations of the search, and halvings of the last step, at most.
+/// Evaluations of the search at most.
 const EVALUATIONS: usize = 40;
-const HALVINGS: usize = 12;
+/// Where the criterion is met, as a share of the way there.
+const SHARPNESS: f64 = 1.0 / 4000.0;
 
 /// What robust parameters buy and cost on sensors that were not used to choose them.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -88,14 +87,6 @@ struct Judged {
     errors: Vec<Vec<Vec<f64>>>,
     /// ln of the largest true over claimed sigma: by axis, sorted.
     ratios: Vec<Vec<f64>>,
-}
-
-/// The last point of a search: mean error, what is short of the criterion, what is too far, and their slopes if they were asked for.
-struct Seen {
-    x: Vec<f64>,
-    sloped: bool,
-    values: [f64; 3],
-    slopes: Vec<[f64; 3]>,
 }
 
 struct Study<'a> {
@@ -192,47 +183,23 @@ impl Study<'_> {
             let error = logs.sum::<f64>() / count + TIE * distance * distance;
             [error, quantile.fold(f64::NEG_INFINITY, f64::max), distance - farthest].map(|v| v.min(f64::MAX.sqrt()))
         };
-        // the three share their work
-        let last: RefCell<Option<Seen>> = RefCell::new(None);
-        let evaluate = |which: usize, x: &[f64], slope: Option<&mut [f64]>| -> f64 {
-            let known = last.borrow().as_ref().is_some_and(|seen| seen.x == x && (seen.sloped || slope.is_none()));
-            if !known {
-                let sloped = slope.is_some();
-                let side = |k: usize, step: f64| {
-                    let mut moved = x.to_vec();
-                    moved[k] += step;
-                    values(&moved)
-                };
-                let slopes = (0..if sloped { n } else { 0 }).map(|k| {
-                    let (above, below) = (side(k, STEP), side(k, -STEP));
-                    [0, 1, 2].map(|i| (above[i] - below[i]) / (2.0 * STEP))
-                });
-                let seen = Seen { x: x.to_vec(), sloped, values: values(x), slopes: slopes.collect() };
-                *last.borrow_mut() = Some(seen);
-            }
-            let last = last.borrow();
-            let Some(seen) = last.as_ref() else { return f64::MAX.sqrt() };
-            if let Some(slope) = slope {
-                slope.iter_mut().zip(&seen.slopes).for_each(|(out, all)| *out = all[which]);
-            }
-            seen.values[which]
+        let all = |points: &[Vec<f64>]| points.iter().map(|x| values(x).to_vec()).collect();
+        let problem = optimize::Problem {
+            look: &|x, _, sloped| look(all, x, &vec![STEP; n], sloped),
+            constraints: 2,
+            f_abs: 1e-7,
+            x_abs: 1e-4,
+            evaluations: EVALUATIONS,
+            rounds: 1,
+            ..optimize::Problem::default()
         };
-        let objective = |x: &[f64], slope: Option<&mut [f64]>, _: &mut ()| evaluate(0, x, slope);
-        let honest = |x: &[f64], slope: Option<&mut [f64]>, _: &mut ()| evaluate(1, x, slope);
-        let near = |x: &[f64], slope: Option<&mut [f64]>, _: &mut ()| evaluate(2, x, slope);
-        let constraints: [&dyn Func<()>; 2] = [&honest, &near];
-        let bounds = vec![(-farthest, farthest); n];
-        let tolerances = StopTols { ftol_abs: 1e-7, xtol_abs: vec![1e-4; n], ..StopTols::default() };
-        let (found, from) = match minimize(objective, &x, &bounds, &constraints, (), EVALUATIONS, Some(tolerances)) {
-            Ok((_, found, _)) | Err((_, found, _)) => (found, x),
-        };
+        let (found, from) = (minimize(&problem, &x, &vec![(-farthest, farthest); n]).x, x);
         // a search that ended outside is worth less than where it began
         let cost = |x: &[f64]| {
             let [error, short, far] = values(x);
             error + 10.0 * (short.max(0.0) + far.max(0.0))
         };
-        let better = found.iter().all(|v| v.is_finite()) && cost(&found) <= cost(&from);
-        Ok(shifts_of(if better { &found } else { &from }))
+        Ok(shifts_of(if cost(&found) <= cost(&from) { &found } else { &from }))
     }
 
     /// The direction, as far as it must be gone for the criterion on many sensors.
@@ -254,11 +221,7 @@ impl Study<'_> {
             }
             far = (1.25 * far).min(farthest);
         }
-        let mut near = 0.0;
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (near + far);
-            if honest(middle)? { far = middle } else { near = middle }
-        }
+        let (_, far) = bisect(0.0, far, half_way(SHARPNESS * far), honest)?;
         Ok(direction * far)
     }
 

@@ -47,6 +47,12 @@ pub fn document<T>(
     read(&Place::root(&value)).map_err(|error| DocumentError::Key { path: path.into(), error })
 }
 
+/// The same from a file.
+pub fn read<T>(path: &Path, read: impl FnOnce(&Place<'_>) -> Result<T, KeyError>) -> Result<T, DocumentError> {
+    let (text, shown) = file(path)?;
+    document(&text, &shown, read)
+}
+
 /// The text of a file and its path as messages show it. Errors: it cannot be read.
 pub fn file(path: &Path) -> Result<(String, String), DocumentError> {
     let shown = path.display().to_string();

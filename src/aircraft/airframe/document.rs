@@ -28,8 +28,7 @@ impl Airplane {
     }
 
     pub fn read(path: &Path) -> Result<Airplane, DocumentError> {
-        let (text, shown) = place::file(path)?;
-        Airplane::from_json(&text, &shown)
+        place::read(path, airplane)
     }
 }
 

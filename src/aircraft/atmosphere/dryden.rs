@@ -125,7 +125,7 @@ impl Dryden {
             Ok([feet / k.powf(1.2), feet, vertical / k.powf(0.4), vertical])
         };
         let aloft = || -> Result<[f64; 4], AirError> {
-            let name = "std_dev, of u, v and w from the specification's chart, for example \"1.5 m/s\"";
+            let name = "std_dev, for example \"1.5 m/s\", or exceedance, for example 1e-2 for light turbulence";
             let std_dev = needs(name, intensity.std_dev_aloft)?;
             Ok([LENGTH_ALOFT, LENGTH_ALOFT, std_dev, std_dev])
         };

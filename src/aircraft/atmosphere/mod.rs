@@ -2,6 +2,7 @@
 
 pub mod discrete;
 pub mod dryden;
+pub mod exceedance;
 pub mod standard;
 pub mod turbulence;
 

@@ -58,12 +58,6 @@ pub struct FlightDocument {
     pub sensors: SensorsEntry,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub autopilot: Option<AutopilotEntry>,
-    /// For `loop`; not read here.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub feeds: Option<serde_json::Value>,
-    /// For `loop`; not read here.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub criteria: Option<serde_json::Value>,
 }
 
 /// Another document: a path, from the folder of this one, or the document itself.
@@ -190,9 +184,14 @@ pub enum GustEntry {
         /// Mean wind 20 ft above ground: 15, 30, 45 kt are light, moderate, severe.
         #[serde(skip_serializing_if = "Option::is_none")]
         wind_at_20ft: Option<Measured>,
-        /// Of u, v, w above 1000 ft.
+        /// Of u, v, w above 1000 ft; no `exceedance` beside it.
         #[serde(skip_serializing_if = "Option::is_none")]
         std_dev: Option<Measured>,
+        /// The same by the chart of MIL-F-8785C, figure 7: the probability that it is exceeded. 1e-2, 1e-3, 1e-5 are
+        /// light, moderate, severe; 0.2, 0.1, 1e-4, 1e-6 have curves too.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schemars(with = "Option<Plain>")]
+        exceedance: Option<f64>,
         /// Above ground; that of the start when absent.
         #[serde(skip_serializing_if = "Option::is_none")]
         height: Option<Measured>,
@@ -312,17 +311,20 @@ pub struct GnssEntry {
     pub rate: Option<Measured>,
 }
 
-/// Rate dampers and attitude loops: δe = kq q + kθ(θ − θc), δa = −kp p − kφ(φ − φc), δr = kr · washout(r), all from
-/// trim.
+/// One law, `gains` or `lqr`; both work on deviations from the trim.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("oneOf" = [{ "required": ["gains"] }, { "required": ["lqr"] }]))]
 pub struct AutopilotEntry {
     pub rate: Measured,
     /// Whole samples from the measurement to the command at the servo; 1 when absent.
     #[serde(default = "one_sample")]
     #[schemars(schema_with = "samples")]
     pub delay: u64,
-    pub gains: GainsEntry,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gains: Option<GainsEntry>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lqr: Option<LqrEntry>,
     /// Time constant of the complementary filter of gyro and attitude reference; 5 s when absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub attitude_filter: Option<Measured>,
@@ -333,6 +335,38 @@ pub struct AutopilotEntry {
     pub bank: Option<Measured>,
 }
 
+/// Weights of the linear-quadratic regulator u = −K x of the linear model about the trim, in continuous time; SI and
+/// rad. It needs the velocity through the air, which no sensor here shows, and takes the true one.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LqrEntry {
+    pub longitudinal: LongitudinalWeights,
+    pub lateral: LateralWeights,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LongitudinalWeights {
+    /// Of u, w, q, theta.
+    #[schemars(with = "[Plain; 4]")]
+    pub states: [f64; 4],
+    #[schemars(with = "Plain")]
+    pub elevator: f64,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LateralWeights {
+    /// Of v, p, r, phi.
+    #[schemars(with = "[Plain; 4]")]
+    pub states: [f64; 4],
+    #[schemars(with = "Plain")]
+    pub aileron: f64,
+    #[schemars(with = "Plain")]
+    pub rudder: f64,
+}
+
+/// Rate dampers and attitude loops: δe = kq q + kθ(θ − θc), δa = −kp p − kφ(φ − φc), δr = kr · washout(r).
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GainsEntry {
@@ -355,8 +389,7 @@ impl FlightDocument {
     }
 
     pub fn read(path: &Path) -> Result<FlightDocument, DocumentError> {
-        let (text, shown) = place::file(path)?;
-        FlightDocument::from_json(&text, &shown)
+        place::read(path, read::flight)
     }
 
     /// The published JSON schema.

@@ -20,7 +20,6 @@ mod streams;
 mod surfaces;
 mod vector;
 
-pub use autopilot::Gains;
 pub use document::FlightDocument;
 pub use plan::{Plan, STEP, Times};
 pub use report::{ColumnReport, FlightReport, RowSink, RunReport, fly};

@@ -70,6 +70,12 @@ impl<'a> World<'a> {
         World { airplane, earth, wind, per_mass: 1.0 / airplane.mass }
     }
 
+    /// Velocity through the steady air, body axes.
+    pub(super) fn through_air(&self, x: &State) -> Vector {
+        let wind = back(&matrix(attitude(x)), self.earth.of_local(position(x), self.wind));
+        minus(velocity(x), wind)
+    }
+
     /// `density`: about a height near by.
     #[inline(always)]
     pub(super) fn instant(&self, x: &State, controls: &Controls, gust: &Gust, density: &DensityNear) -> Instant {

@@ -2,20 +2,24 @@
 
 use std::path::Path;
 
+use nalgebra::{DMatrix, DVector};
+
 use super::FlightError;
-use super::autopilot::{Gains, Reference};
+use super::autopilot::{Gains, Law, Reference, StateFeedback};
 use super::commands::{self, Commands};
-use super::document::{EarthEntry, FlightDocument, GustEntry, WindEntry};
+use super::document::{EarthEntry, FlightDocument, GustEntry, LqrEntry, WindEntry};
 use super::earth::{Earth, Geodetic};
 use super::motion::{State, World};
 use super::sensors::{Errors, three_axes};
 use super::start::{self, Start};
 use super::surfaces::CONTROLS;
-use super::vector::{Vector, back, dot, matrix, minus, times};
+use super::vector::{Vector, dot, matrix, times};
 use crate::aircraft::airframe::Airplane;
+use crate::aircraft::airframe::linear::LinearModel;
 use crate::aircraft::atmosphere::discrete::DiscreteGust;
 use crate::aircraft::atmosphere::dryden::{Dryden, Intensity};
-use crate::aircraft::atmosphere::standard;
+use crate::aircraft::atmosphere::{AirError, exceedance, standard};
+use crate::aircraft::control::regulator::regulator;
 use crate::params::{Measured, Params};
 use crate::units::Quantity;
 
@@ -57,7 +61,7 @@ impl Grid {
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AutopilotPlan {
-    pub gains: Gains,
+    pub law: Law,
     pub reference: Reference,
     /// Samples from one command to the next.
     pub every: u64,
@@ -125,7 +129,7 @@ impl Plan {
             )));
         }
         let world = World::new(&airplane, earth, wind);
-        let airspeed = airspeed(&world, &state);
+        let airspeed = dot(world.through_air(&state), world.through_air(&state)).sqrt();
         let (dryden, discrete) = gusts(document, altitude - ground, airspeed, airplane.size.span)?;
         let sensors = &document.sensors;
         let read = |key: &str, linked: &Option<super::document::Linked>, quantity: Quantity, what: &str| {
@@ -166,7 +170,7 @@ impl Plan {
         let commands = commands::read(&document.controls, folder, controls, times.duration)?;
         let [elevator, aileron, rudder, _] = commands.fixed;
         let reference = Reference { surfaces: [elevator, aileron, rudder], ..reference };
-        let autopilot = autopilot(document, reference, &grid, sensors.attitude.is_some())?;
+        let autopilot = autopilot(document, &airplane, reference, &grid, sensors.attitude.is_some())?;
         if autopilot.is_some() && commands.rows.iter().any(|(_, row)| row[..3] != commands.fixed[..3]) {
             return Err(FlightError(
                 "controls.file: moves a surface that the autopilot moves; leave one of them out".into(),
@@ -198,14 +202,6 @@ impl Plan {
     }
 }
 
-/// Through the steady air.
-fn airspeed(world: &World<'_>, x: &State) -> f64 {
-    let c = matrix(super::motion::attitude(x));
-    let wind = back(&c, world.earth.of_local(super::motion::position(x), world.wind));
-    let v = minus(super::motion::velocity(x), wind);
-    dot(v, v).sqrt()
-}
-
 fn gusts(
     document: &FlightDocument,
     above_ground: f64,
@@ -215,15 +211,16 @@ fn gusts(
     let (mut dryden, mut discrete) = (Vec::new(), Vec::new());
     for (i, gust) in document.gusts.iter().enumerate() {
         match gust {
-            GustEntry::Dryden { specification, wind_at_20ft, std_dev, height, airspeed } => {
+            GustEntry::Dryden { specification, wind_at_20ft, std_dev, exceedance, height, airspeed } => {
+                let refused = |e: AirError| at(&format!("gusts[{i}]"))(e.to_string());
                 let height = height.as_ref().map_or(above_ground, Measured::si);
+                let of_chart = |probability| exceedance::std_dev(probability, height).map_err(refused);
                 let intensity = Intensity {
                     wind_at_20ft: wind_at_20ft.as_ref().map(Measured::si),
-                    std_dev_aloft: std_dev.as_ref().map(Measured::si),
+                    std_dev_aloft: std_dev.as_ref().map(|m| Ok(m.si())).or(exceedance.map(of_chart)).transpose()?,
                 };
                 let speed = airspeed.as_ref().map_or(speed, Measured::si);
-                let gust = Dryden::new(*specification, height, intensity, speed, span);
-                dryden.push(gust.map_err(|e| at(&format!("gusts[{i}]"))(e.to_string()))?);
+                dryden.push(Dryden::new(*specification, height, intensity, speed, span).map_err(refused)?);
             }
             GustEntry::Discrete { form, length, u, v, w, start } => discrete.push(DiscreteGust {
                 form: *form,
@@ -277,6 +274,7 @@ fn grid(times: &Times, given: Option<f64>) -> Result<Grid, FlightError> {
 
 fn autopilot(
     document: &FlightDocument,
+    airplane: &Airplane,
     mut reference: Reference,
     grid: &Grid,
     measured: bool,
@@ -292,21 +290,44 @@ fn autopilot(
     if let Some(pitch) = &entry.pitch {
         reference.angles[1] = pitch.si();
     }
-    let gains = &entry.gains;
-    Ok(Some(AutopilotPlan {
-        gains: Gains {
+    let law = match (&entry.gains, &entry.lqr) {
+        (Some(gains), _) => Law::Gains(Gains {
             kq: gains.kq.si(),
             ktheta: gains.ktheta,
             kp: gains.kp.si(),
             kphi: gains.kphi,
             kr: gains.kr.si(),
             washout: gains.washout.as_ref().map_or(1.0, Measured::si),
-        },
+        }),
+        (None, Some(lqr)) => Law::Regulator(state_feedback(lqr, document, airplane).map_err(at("autopilot.lqr"))?),
+        (None, None) => return Err(FlightError("autopilot: expected one of gains and lqr".into())),
+    };
+    Ok(Some(AutopilotPlan {
+        law,
         reference,
         every,
         delay: entry.delay as f64 / rate,
         filter: measured.then(|| entry.attitude_filter.as_ref().map_or(5.0, Measured::si)),
     }))
+}
+
+/// Optimal gains about the trim of the document.
+fn state_feedback(lqr: &LqrEntry, document: &FlightDocument, airplane: &Airplane) -> Result<StateFeedback, String> {
+    let entry = document.trim.as_ref().ok_or("needs a trim, about which its gains are made; give trim too")?;
+    let trim = start::trim(entry, airplane).map_err(|e| e.to_string())?;
+    let models = airplane.linear(&trim);
+    let diagonal = |weights: &[f64]| DMatrix::from_diagonal(&DVector::from_column_slice(weights));
+    let gain = |model: &LinearModel, inputs: &[&str], states: &[f64; 4], weights: &[f64]| {
+        let columns: Vec<usize> = (0..model.inputs.len()).filter(|i| inputs.contains(&model.inputs[*i].0)).collect();
+        regulator(&model.a, &model.b.select_columns(&columns), &diagonal(states), &diagonal(weights))
+            .map(|found| found.gain)
+            .map_err(|e| format!("no optimal gains of the {} motion: {e}; give other weights", model.name))
+    };
+    let (x, y) = (&lqr.longitudinal, &lqr.lateral);
+    let along = gain(&models.longitudinal, &["elevator"], &x.states, &[x.elevator])?;
+    let across = gain(&models.lateral, &["aileron", "rudder"], &y.states, &[y.aileron, y.rudder])?;
+    let row = |gain: &DMatrix<f64>, i: usize| std::array::from_fn(|j| gain[(i, j)]);
+    Ok(StateFeedback { along: row(&along, 0), across: [row(&across, 0), row(&across, 1)], velocity: trim.velocity })
 }
 
 /// A place and the attitude there as a state; `velocity` and `rate` in body axes, relative to the earth.

@@ -45,7 +45,7 @@ impl Plan {
         let mut row = Vec::new();
         let euler = flying.euler();
         let mut autopilot = self.autopilot.map(|a| {
-            Autopilot::new(a.gains, a.reference, a.every as f64 / self.grid.rate, a.filter, [euler[0], euler[1]])
+            Autopilot::new(a.law, a.reference, a.every as f64 / self.grid.rate, a.filter, [euler[0], euler[1]])
         });
         for sample in 0..=self.grid.samples {
             let time = sample as f64 / self.grid.rate;
@@ -58,7 +58,8 @@ impl Plan {
             if let (Some(autopilot), Some(plan)) = (&mut autopilot, &self.autopilot)
                 && sample.is_multiple_of(plan.every)
             {
-                let command = autopilot.command(measured.gyro, [measured.attitude[0], measured.attitude[1]]);
+                let angles = [measured.attitude[0], measured.attitude[1]];
+                let command = autopilot.command(measured.gyro, angles, flying.world.through_air(&flying.x));
                 for (surface, command) in flying.surfaces.0.iter_mut().zip(command) {
                     surface.order(time + plan.delay, command);
                 }

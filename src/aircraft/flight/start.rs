@@ -95,6 +95,8 @@ pub(super) fn start(
         controls = Some([c.elevator, c.aileron, c.rudder, c.throttle]);
         velocity = plus(velocity, back(&from_euler(euler), wind));
     }
+    // an airplane that starts beside its trim is brought back to it
+    let trimmed = document.trim.as_ref().map(|_| (rate, [euler[0], euler[1]]));
     let mut place = [of_earth[0], of_earth[1]];
     if let Some(i) = &document.initial {
         let zero = |m: &Option<Measured>| si(m).unwrap_or(0.0);
@@ -117,6 +119,7 @@ pub(super) fn start(
         return Err(FlightError("trim: missing; give a trim or an initial state to start from".into()));
     }
     let state = super::plan::state(earth, Geodetic { latitude, longitude, height }, euler, velocity, rate);
-    let reference = Reference { rate, angles: [euler[0], euler[1]], surfaces: [0.0; 3] };
+    let (rate, angles) = trimmed.unwrap_or((rate, [euler[0], euler[1]]));
+    let reference = Reference { rate, angles, surfaces: [0.0; 3] };
     Ok(Start { state, controls, reference, altitude: height })
 }

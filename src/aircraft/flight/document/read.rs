@@ -6,7 +6,8 @@ use serde_json::Value;
 
 use super::{
     AutopilotEntry, ControlsEntry, DriftEntry, EarthEntry, ErrorEntry, FORMAT, FlightDocument, GainsEntry, GnssEntry,
-    GustEntry, InitialEntry, Linked, PlaceEntry, SensorsEntry, TrimEntry, WindEntry,
+    GustEntry, InitialEntry, LateralWeights, Linked, LongitudinalWeights, LqrEntry, PlaceEntry, SensorsEntry,
+    TrimEntry, WindEntry,
 };
 use crate::aircraft::atmosphere::discrete::Form;
 use crate::aircraft::atmosphere::dryden::Specification;
@@ -63,8 +64,6 @@ pub(super) fn flight(place: &Place<'_>) -> Result<FlightDocument, KeyError> {
         "gusts",
         "sensors",
         "autopilot",
-        "feeds",
-        "criteria",
     ];
     let o = place.document(FORMAT, "flight.json", &known)?;
     let many = |place: Place<'_>| place.one_or_many()?.iter().map(gust).collect::<Result<Vec<_>, _>>();
@@ -80,8 +79,6 @@ pub(super) fn flight(place: &Place<'_>) -> Result<FlightDocument, KeyError> {
         gusts: o.optional("gusts").map(many).transpose()?.unwrap_or_default(),
         sensors: o.optional("sensors").map(|p| sensors(&p)).transpose()?.unwrap_or_default(),
         autopilot: o.optional("autopilot").map(|p| autopilot(&p)).transpose()?,
-        feeds: o.optional("feeds").map(|p| p.value().clone()),
-        criteria: o.optional("criteria").map(|p| p.value().clone()),
     })
 }
 
@@ -180,6 +177,7 @@ fn gust(place: &Place<'_>) -> Result<GustEntry, KeyError> {
         "specification",
         "wind_at_20ft",
         "std_dev",
+        "exceedance",
         "height",
         "airspeed",
         "form",
@@ -191,12 +189,18 @@ fn gust(place: &Place<'_>) -> Result<GustEntry, KeyError> {
     ];
     let model = word(&place.object(&known)?.required("model")?, &["dryden", "1-cos"])?;
     if model == "dryden" {
-        let o = place.object(&["model", "specification", "wind_at_20ft", "std_dev", "height", "airspeed"])?;
+        let o =
+            place.object(&["model", "specification", "wind_at_20ft", "std_dev", "exceedance", "height", "airspeed"])?;
         let named = o.required("specification")?;
         let specification = Specification::from_name(named.text()?)
             .ok_or_else(|| named.error(format!("known are {}", Specification::NAMES.join(", "))))?;
+        let exceedance = o.optional("exceedance");
+        if let (Some(_), Some(place)) = (o.optional("std_dev"), &exceedance) {
+            return Err(place.error("stands beside std_dev; give one of both"));
+        }
         return Ok(GustEntry::Dryden {
             specification,
+            exceedance: exceedance.as_ref().map(Place::plain).transpose()?,
             wind_at_20ft: value(&o, "wind_at_20ft", VELOCITY, Range::Positive)?,
             std_dev: value(&o, "std_dev", VELOCITY, Range::Positive)?,
             height: value(&o, "height", LENGTH, Range::Positive)?,
@@ -274,11 +278,16 @@ fn errors(place: &Place<'_>, dimension: Dimension) -> Result<ErrorEntry, KeyErro
 }
 
 fn autopilot(place: &Place<'_>) -> Result<AutopilotEntry, KeyError> {
-    let o = place.object(&["rate", "delay", "gains", "attitude_filter", "pitch", "bank"])?;
+    let o = place.object(&["rate", "delay", "gains", "lqr", "attitude_filter", "pitch", "bank"])?;
+    let (of_gains, of_lqr) = (o.optional("gains"), o.optional("lqr"));
+    if of_gains.is_some() == of_lqr.is_some() {
+        return Err(place.error("expected one of gains and lqr, by which the surfaces move"));
+    }
     Ok(AutopilotEntry {
         rate: required(&o, "rate", Dimension::FREQUENCY)?,
         delay: o.optional("delay").map(|p| samples(&p)).transpose()?.unwrap_or(1),
-        gains: gains(&o.required("gains")?)?,
+        gains: of_gains.map(|p| gains(&p)).transpose()?,
+        lqr: of_lqr.map(|p| lqr(&p)).transpose()?,
         attitude_filter: value(&o, "attitude_filter", Dimension::TIME, Range::Positive)?,
         pitch: value(&o, "pitch", ANGLE, Range::Any)?,
         bank: value(&o, "bank", ANGLE, Range::Any)?,
@@ -294,6 +303,38 @@ fn samples(place: &Place<'_>) -> Result<u64, KeyError> {
     count.filter(|_| unit && words.next().is_none()).ok_or_else(|| {
         place.error(format!("expected a whole number of samples, for example \"1 sample\", found \"{text}\""))
     })
+}
+
+fn lqr(place: &Place<'_>) -> Result<LqrEntry, KeyError> {
+    let o = place.object(&["longitudinal", "lateral"])?;
+    let along = o.required("longitudinal")?.object(&["states", "elevator"])?;
+    let across = o.required("lateral")?.object(&["states", "aileron", "rudder"])?;
+    Ok(LqrEntry {
+        longitudinal: LongitudinalWeights {
+            states: state_weights(&along, "u, w, q, theta")?,
+            elevator: input_weight(&along, "elevator")?,
+        },
+        lateral: LateralWeights {
+            states: state_weights(&across, "v, p, r, phi")?,
+            aileron: input_weight(&across, "aileron")?,
+            rudder: input_weight(&across, "rudder")?,
+        },
+    })
+}
+
+fn state_weights(object: &Object<'_>, names: &str) -> Result<[f64; 4], KeyError> {
+    let place = object.required("states")?;
+    let values = place.list()?.iter().map(Place::plain).collect::<Result<Vec<f64>, _>>()?;
+    <[f64; 4]>::try_from(values.as_slice())
+        .ok()
+        .filter(|values| values.iter().all(|x| *x >= 0.0))
+        .ok_or_else(|| place.error(format!("expected the weights of {names}: four numbers of zero or more")))
+}
+
+fn input_weight(object: &Object<'_>, key: &str) -> Result<f64, KeyError> {
+    let place = object.required(key)?;
+    let value = place.plain()?;
+    if value > 0.0 { Ok(value) } else { Err(place.error(format!("found {value}, expected more than zero"))) }
 }
 
 fn gains(place: &Place<'_>) -> Result<GainsEntry, KeyError> {

@@ -119,6 +119,13 @@ fn a_wrong_document_is_refused_by_its_key() {
         },
         &["aerodynamics.yaw.beta", "missing", "would mean that sideslip makes no yawing moment"],
     );
+    for (key, value) in [("frequency", "0 rad/s"), ("damping", "0"), ("rate_limit", "-1 rad/s")] {
+        wrong(&|d| d["actuators"]["rudder"][key] = json!(value), &["actuators.rudder", key, "more than zero"]);
+    }
+    wrong(&|d| d["actuators"]["rudder"]["delay"] = json!("-1 ms"), &["actuators.rudder.delay", "zero or more"]);
+    wrong(&|d| d["actuators"]["rudder"]["limit"] = json!("-5 deg"), &["actuators.rudder", "lower stop"]);
+    wrong(&|d| d["aerodynamics"]["stall"]["sharpness"] = json!("-5"), &["stall.sharpness", "more than zero"]);
+    wrong(&|d| d["reference"]["chord"] = json!("0 m"), &["reference.chord", "more than zero"]);
     wrong(&|d| d["aerodynamics"]["pitch"]["alhpa"] = json!("1 1/rad"), &["alhpa", "did you mean 'alpha'"]);
 }
 

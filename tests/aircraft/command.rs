@@ -85,6 +85,17 @@ fn what_cannot_be_flown_is_refused_in_one_line() {
         gust.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
         change("gusts", gust)
     };
+    let pilot = |more: Value| {
+        let mut document = document();
+        document["autopilot"].as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        document
+    };
+    let lqr = |states: Value, elevator: u32| {
+        json!({
+            "longitudinal": { "states": states, "elevator": elevator },
+            "lateral": { "states": [0, 0, 0, 0], "aileron": 1, "rudder": 1 }
+        })
+    };
     let rows: Vec<(Value, &str, &[&str])> = vec![
         (trim("25 km", "25 m/s"), "", &["flight.json: trim:", "altitude 24902", "-2000 m to 20000 m"]),
         (trim("100 m", "25"), "", &["trim.airspeed", "\"25\""]),
@@ -105,7 +116,16 @@ fn what_cannot_be_flown_is_refused_in_one_line() {
         (change("controls", json!("none.csv")), "", &["none.csv", "cannot read"]),
         (change("controls", json!("short.csv")), "--duration 4s", &["short.csv: ends at 3 s, before the 4 s"]),
         (change("ground", json!("200 m")), "", &["altitude: 100 m is below the ground at 200 m"]),
-        (trim("1000 m", "25 m/s"), "", &["gusts[0]", "1000 m (3281 ft)", "needs std_dev", "for example \"1.5 m/s\""]),
+        (trim("1000 m", "25 m/s"), "", &["gusts[0]", "1000 m (3281 ft)", "needs std_dev", "or exceedance"]),
+        (dryden(json!({ "exceedance": 0.3 })), "", &["gusts[0]: exceedance 0.3", "curves for"]),
+        (dryden(json!({ "exceedance": 1e-3, "std_dev": "1 m/s" })), "", &["gusts.exceedance", "beside std_dev"]),
+        (pilot(json!({ "gains": null })), "", &["autopilot: expected one of gains and lqr"]),
+        (
+            pilot(json!({ "gains": null, "lqr": lqr(json!([1, 1, 1]), 1) })),
+            "",
+            &["longitudinal.states", "u, w, q, theta"],
+        ),
+        (pilot(json!({ "gains": null, "lqr": lqr(json!([1, 1, 1, 1]), 0) })), "", &["elevator", "more than zero"]),
         (quiet.clone(), "--duration 1.003s", &["duration 1.003 s is no whole number of samples at 100 Hz"]),
         (quiet.clone(), "--every 3ms", &["every 0.003 s"]),
         (quiet.clone(), "--duration -1s", &["duration -1 s: expected a positive time"]),

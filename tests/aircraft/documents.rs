@@ -85,7 +85,14 @@ fn flights_are_what_their_schema_says() {
     other["initial"] = json!({ "altitude": "100 m", "u": "25 m/s" });
     other["gusts"] = json!([other["gusts"], { "model": "1-cos", "form": "hold", "length": "25 m", "w": "-3 m/s" }]);
     other["autopilot"]["delay"] = json!(2);
-    all.push(other);
+    let mut optimal = other.clone();
+    optimal["gusts"] =
+        json!({ "model": "dryden", "specification": "MIL-HDBK-1797", "exceedance": "1e-3", "height": "1 km" });
+    optimal["autopilot"] = json!({ "rate": "100 Hz", "lqr": {
+        "longitudinal": { "states": [0.01, "0.01", 1, 4], "elevator": 1 },
+        "lateral": { "states": [0.01, 0.2, 1, 2], "aileron": 1, "rudder": "1" }
+    } });
+    all.extend([other, optimal]);
     agree("flight", &all, |text| FlightDocument::from_json(text, "flight").map(|_| ()).map_err(|e| e.to_string()));
 }
 

@@ -1,6 +1,7 @@
 //! Dryden turbulence: closed forms, a second implementation's numbers, and simulated paths against exact covariances.
 
 use kfdesign::aircraft::atmosphere::dryden::{Dryden, Intensity, STATES, Specification};
+use kfdesign::aircraft::atmosphere::exceedance::std_dev;
 use kfdesign::aircraft::atmosphere::turbulence::Turbulence;
 use kfdesign::numerics::distribution::chi_square_quantile;
 use kfdesign::numerics::random::{StreamId, stream};
@@ -201,6 +202,33 @@ fn heights_without_turbulence_are_refused_and_between_it_is_linear() {
     close(&at(1500.0).lengths, &[1375.0 * ft; 3], 1e-9);
     close(&at(1500.0).std_devs, &[0.5 * (0.1 * LIGHT + 1.5); 3], 1e-9);
     close(&make(5_000.0, None, Some(1.5)).unwrap().std_devs, &[1.5; 3], 1e-15);
+}
+
+/// Figures read off the chart of MIL-F-8785C as JSBSim holds them, and between its heights.
+#[test]
+fn intensity_aloft_is_that_of_the_chart() {
+    let ft = 0.3048;
+    let at = |probability: f64, feet: f64| std_dev(probability, feet * ft);
+    for (probability, feet, expected) in [
+        (1e-2, 3750.0, 7.4),
+        (1e-3, 7500.0, 10.1),
+        (1e-5, 35_000.0, 16.0),
+        (0.2, 2000.0, 2.2 - 0.7 * 250.0 / 2000.0),
+        // lengths and intensities of less than 2000 ft go over to this
+        (1e-2, 1000.0, 6.9 + 0.5 * 250.0 / 2000.0),
+        (1e-6, 65_000.0, 10.7),
+        (1e-3, 60_000.0, 1.35),
+    ] {
+        close(&[at(probability, feet).unwrap()], &[expected * ft], 1e-12);
+    }
+    for (probability, feet, words) in [
+        (0.5, 3000.0, "curves for 0.2, 0.1, 0.01, 0.001, 0.0001, 0.00001, 0.000001"),
+        (1e-2, 45_000.0, "give a smaller exceedance"),
+        (1e-6, 81_000.0, "ends at 80000 ft"),
+    ] {
+        let message = at(probability, feet).unwrap_err().to_string();
+        assert!(message.contains(words), "{message}");
+    }
 }
 
 fn path(seed: u64, run: u64, dt: f64) -> Turbulence {

@@ -69,7 +69,8 @@ pub struct Aerodynamics {
     pub stall: Option<Stall>,
 }
 
-/// atan2(y, x); where |y| ≤ x/5, as in flight, by the series of the arctangent, of which 11 terms are the whole to rounding.
+/// atan2(y, x); where |y| ≤ x/5, as in flight, by the series of the arctangent, of which 11 terms are the whole to
+/// rounding.
 #[inline(always)]
 fn direction(y: f64, x: f64) -> f64 {
     if x > 0.0 && y.abs() <= 0.2 * x {

@@ -88,6 +88,12 @@ fn positive(object: &Object<'_>, key: &str, dimension: Dimension) -> Result<f64,
     Err(place.error(format!("found {} {}, expected more than zero", measured.value, measured.unit)))
 }
 
+/// Plain.
+fn more_than_zero(place: &Place<'_>) -> Result<f64, KeyError> {
+    let value = place.plain()?;
+    if value > 0.0 { Ok(value) } else { Err(place.error(format!("found {value}, expected more than zero"))) }
+}
+
 /// Plain, zero when absent.
 fn optional(object: &Object<'_>, key: &str) -> Result<f64, KeyError> {
     object.optional(key).map_or(Ok(0.0), |place| place.plain())
@@ -169,13 +175,7 @@ fn aerodynamics(place: &Place<'_>) -> Result<Aerodynamics, KeyError> {
     let drag_place = o.required("drag")?;
     let d = drag_place.object(&["parasitic", "oswald", "polar", "pitch_rate", "elevator"])?;
     let drag = match (d.optional("oswald"), d.optional("polar")) {
-        (Some(e), None) => {
-            let value = e.plain()?;
-            if value <= 0.0 {
-                return Err(e.error(format!("found {value}, expected more than zero")));
-            }
-            Drag::Oswald(value)
-        }
+        (Some(e), None) => Drag::Oswald(more_than_zero(&e)?),
         (None, Some(polar)) => match polar.list()?.as_slice() {
             [factor, least] => Drag::Polar { factor: factor.plain()?, least: least.plain()? },
             list => return Err(polar.error(format!("expected [k, CL of least drag], found {} values", list.len()))),
@@ -185,7 +185,7 @@ fn aerodynamics(place: &Place<'_>) -> Result<Aerodynamics, KeyError> {
     let of_drag = |key: &str| if d.optional(key).is_some() { derivative(&d, key, "") } else { Ok(0.0) };
     let stall = o.optional("stall").map(|p| -> Result<Stall, KeyError> {
         let o = p.object(&["sharpness", "angle"])?;
-        Ok(Stall { sharpness: o.required("sharpness")?.plain()?, angle: positive(&o, "angle", ANGLE)? })
+        Ok(Stall { sharpness: more_than_zero(&o.required("sharpness")?)?, angle: positive(&o, "angle", ANGLE)? })
     });
     Ok(Aerodynamics {
         lift,
@@ -287,20 +287,19 @@ fn actuator(place: &Place<'_>) -> Result<Actuator, KeyError> {
     if travel[0] >= travel[1] {
         return Err(place.error("limit: the lower stop is not below the upper one"));
     }
-    let damping = o.required("damping")?;
-    let value = damping.plain()?;
-    if value <= 0.0 {
-        return Err(damping.error(format!("found {value}, expected more than zero")));
-    }
-    let optional = |key: &str, dimension: Dimension| {
-        o.optional(key).map(|p| Measured::from_place(&p, dimension, Range::Any).map(|m| m.si())).transpose()
-    };
+    let delay = o.optional("delay").map(|p| -> Result<f64, KeyError> {
+        let delay = Measured::from_place(&p, Dimension::TIME, Range::Any)?;
+        if delay.value >= 0.0 {
+            return Ok(delay.si());
+        }
+        Err(p.error(format!("found {} {}, expected zero or more", delay.value, delay.unit)))
+    });
     Ok(Actuator {
         frequency: positive(&o, "frequency", RATE)?,
-        damping: value,
+        damping: more_than_zero(&o.required("damping")?)?,
         travel,
-        rate_limit: optional("rate_limit", RATE)?.unwrap_or(f64::INFINITY),
-        delay: optional("delay", Dimension::TIME)?.unwrap_or(0.0).max(0.0),
+        rate_limit: o.optional("rate_limit").map_or(Ok(f64::INFINITY), |_| positive(&o, "rate_limit", RATE))?,
+        delay: delay.transpose()?.unwrap_or(0.0),
     })
 }
 

@@ -39,7 +39,7 @@ pub(super) struct Instant {
     /// Relative to the earth.
     pub rate: Vector,
     /// Relative to the air with its gusts.
-    pub airspeed: f64,
+    pub air: AirState,
     /// Geometric.
     pub height: f64,
 }
@@ -112,7 +112,7 @@ impl<'a> World<'a> {
             // through the air at large: gusts lie along this way
             if gust.velocity == [0.0; 3] { airspeed } else { norm(minus(v, wind)) },
         ];
-        Instant { derivative, specific_force, rate, airspeed, height: field.height }
+        Instant { derivative, specific_force, rate, air, height: field.height }
     }
 }
 

@@ -78,6 +78,7 @@ pub(super) struct SensorPlan {
     pub accelerometer_position: Vector,
     pub attitude: Option<Errors>,
     pub airspeed: Option<Errors>,
+    pub airspeed_position: Vector,
     pub altitude: Option<Errors>,
     pub gnss_position: Option<Errors>,
     pub gnss_velocity: Option<Errors>,
@@ -129,7 +130,8 @@ impl Plan {
             )));
         }
         let world = World::new(&airplane, earth, wind);
-        let airspeed = dot(world.through_air(&state), world.through_air(&state)).sqrt();
+        let through_air = world.through_air(&state);
+        let airspeed = dot(through_air, through_air).sqrt();
         let (dryden, discrete) = gusts(document, altitude - ground, airspeed, airplane.size.span)?;
         let sensors = &document.sensors;
         let read = |key: &str, linked: &Option<super::document::Linked>, quantity: Quantity, what: &str| {
@@ -165,6 +167,7 @@ impl Plan {
             gyro,
             accelerometer,
             accelerometer_position: airplane.position("accelerometer"),
+            airspeed_position: airplane.position("airspeed"),
             gnss_antenna: airplane.position("gnss"),
         };
         let commands = commands::read(&document.controls, folder, controls, times.duration)?;

@@ -8,7 +8,7 @@ use super::plan::{Plan, point};
 use super::sensors::{Channel, Errors, Inertial, InertialErrors};
 use super::streams;
 use super::surfaces::Surfaces;
-use super::vector::{Vector, back, cross, plus, to_euler};
+use super::vector::{Vector, back, cross, dot, plus, to_euler};
 use crate::aircraft::atmosphere::{Gust, standard};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -94,7 +94,8 @@ impl Measurements {
             gyro: plus(rate, gyro.all),
             attitude: angles,
             accelerometer: plus(specific_force, accelerometer.all),
-            airspeed: instant.airspeed + self.airspeed.as_mut().map_or(0.0, |channel| channel.error(sample)),
+            airspeed: airspeed(instant, plan.sensors.airspeed_position)
+                + self.airspeed.as_mut().map_or(0.0, |channel| channel.error(sample)),
             altitude: standard::geopotential(instant.height)
                 + self.altitude.as_mut().map_or(0.0, |channel| channel.error(sample)),
             gnss_position: if gnss {
@@ -107,6 +108,12 @@ impl Measurements {
             specific_force,
         }
     }
+}
+
+/// Of a point of the airplane: the air turns with its gust like a rigid body.
+fn airspeed(instant: &Instant, arm: Vector) -> f64 {
+    let v = plus(instant.air.velocity, cross(instant.air.rate, arm));
+    dot(v, v).sqrt()
 }
 
 /// North, east, down, or latitude, longitude, height.

@@ -31,9 +31,8 @@ struct Flying<'a> {
 }
 
 impl Plan {
-    /// Flies run number `run` and hands out the rows in order. Errors: the airplane meets the ground or leaves the standard atmosphere, the
-    /// integration becomes unstable, or what
-    /// `hand_out` says.
+    /// Flies run number `run` and hands out the rows in order. Errors: the airplane meets the ground or leaves the
+    /// standard atmosphere, the integration becomes unstable, or what `hand_out` says.
     pub(super) fn fly<E: From<FlightError>>(
         &self,
         seed: u64,
@@ -145,8 +144,8 @@ impl<'a> Flying<'a> {
         let ground = self.plan.ground;
         if height < ground && !self.unsteady() {
             return Err(FlightError(format!(
-                "at {time:.3} s: the airplane meets the ground, which is at {ground} m; start higher, or end the flight \
-                 before with --duration"
+                "at {time:.3} s: the airplane meets the ground, which is at {ground} m; start higher, or end the \
+                 flight before with --duration"
             )));
         }
         if !self.density.reaches(height) {

@@ -17,6 +17,7 @@ What one must know of JSBSim to compare with it:
 import ast
 import json
 import math
+import os
 import pathlib
 import subprocess
 import sys
@@ -261,6 +262,15 @@ def fly_peer(folder, seed, duration=60.0):
     return time.process_time() - begin
 
 
+def measured(command):
+    """Wall and processor time (s) and peak memory (MB) of a program on two threads."""
+    begin = time.perf_counter()
+    child = subprocess.Popen(command, stdout=subprocess.DEVNULL, env=os.environ | {"RAYON_NUM_THREADS": "2"})
+    _, status, usage = os.wait4(child.pid, 0)
+    assert status == 0, command
+    return time.perf_counter() - begin, usage.ru_utime, usage.ru_maxrss / 1000
+
+
 def cost(program, folder, flights):
     airplane = str(ROOT / "data/airplanes/aerosonde.json")
     document = {
@@ -271,10 +281,8 @@ def cost(program, folder, flights):
         "autopilot": {"rate": "100 Hz", "delay": 1, "gains": {"kq": "0.2 s", "ktheta": 0.6, "kp": "0.06 s", "kphi": 0.6, "kr": "0.15 s"}},
     }
     (folder / "flight.json").write_text(json.dumps(document))
-    begin = time.perf_counter()
-    command = ["/usr/bin/env", "RAYON_NUM_THREADS=2", program, "fly", str(folder / "flight.json"), "--duration", "60s", "--runs", str(flights)]
-    usage = subprocess.run(["bash", "-c", "TIMEFORMAT='%U'; time \"$@\" > /dev/null", "bash", *command], check=True, capture_output=True, text=True)
-    wall, ours = time.perf_counter() - begin, float(usage.stderr.split()[-1])
+    command = [program, "fly", str(folder / "flight.json"), "--duration", "60s", "--runs"]
+    wall, ours, _ = measured([*command, str(flights)])
     peers = max(2, flights // 25)
     begin = time.perf_counter()
     with ProcessPoolExecutor(2) as pool:
@@ -282,6 +290,8 @@ def cost(program, folder, flights):
     peer_wall = time.perf_counter() - begin
     a, b = ours / (flights * 60), theirs / (peers * 60)
     print(f"\n{flights} flights of 60 s at 400 Hz on two cores: {wall:.2f} s, {ours:.2f} s of processor time, {1e3 * a:.3f} ms per flight second and core")
+    few, many = (measured([*command, str(runs)])[2] for runs in (10, 200))
+    print(f"memory at its peak: {few:.1f} MB with 10 flights, {many:.1f} MB with 200")
     print(f"JSBSim, {peers} of them: {peer_wall:.2f} s, {theirs:.2f} s of processor time, {1e3 * b:.3f} ms per flight second and core: {b / a:.1f} times ours")
 
 

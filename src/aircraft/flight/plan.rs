@@ -8,7 +8,7 @@ use super::FlightError;
 use super::autopilot::{Gains, Law, Reference, StateFeedback};
 use super::commands::{self, Commands};
 use super::document::{EarthEntry, FlightDocument, GustEntry, LqrEntry, WindEntry};
-use super::earth::{Earth, Geodetic};
+use super::earth::Earth;
 use super::motion::{State, World};
 use super::sensors::{Errors, three_axes};
 use super::start::{self, Start};
@@ -331,20 +331,6 @@ fn state_feedback(lqr: &LqrEntry, document: &FlightDocument, airplane: &Airplane
     let across = gain(&models.lateral, &["aileron", "rudder"], &y.states, &[y.aileron, y.rudder])?;
     let row = |gain: &DMatrix<f64>, i: usize| std::array::from_fn(|j| gain[(i, j)]);
     Ok(StateFeedback { along: row(&along, 0), across: [row(&across, 0), row(&across, 1)], velocity: trim.velocity })
-}
-
-/// A place and the attitude there as a state; `velocity` and `rate` in body axes, relative to the earth.
-pub(super) fn state(earth: Earth, place: Geodetic, euler: Vector, velocity: Vector, rate: Vector) -> State {
-    let r = match earth {
-        Earth::Flat => [0.0, 0.0, -place.height],
-        Earth::Wgs84 => place.to_ecef(),
-    };
-    let attitude = earth.attitude(r, &super::vector::from_euler(euler));
-    let c = matrix(attitude);
-    let inertial = super::vector::plus(rate, earth.field(r, &c).rate);
-    let [a, b, d] = [r, velocity, inertial];
-    let e = attitude;
-    [a[0], a[1], a[2], b[0], b[1], b[2], e[0], e[1], e[2], e[3], d[0], d[1], d[2], 0.0]
 }
 
 /// Where a point of the airplane is and how it moves, north, east, down from the start.

@@ -10,7 +10,7 @@ use super::earth::{Earth, Geodetic};
 use super::motion::State;
 use super::servo::Servo;
 use super::surfaces::CONTROLS;
-use super::vector::{Vector, back, from_euler, plus};
+use super::vector::{Vector, back, from_euler, matrix, plus};
 use crate::aircraft::airframe::trim::Trim;
 use crate::aircraft::airframe::{Actuator, Airplane, Propulsion};
 use crate::params::Measured;
@@ -118,8 +118,22 @@ pub(super) fn start(
     if document.trim.is_none() && document.initial.is_none() {
         return Err(FlightError("trim: missing; give a trim or an initial state to start from".into()));
     }
-    let state = super::plan::state(earth, Geodetic { latitude, longitude, height }, euler, velocity, rate);
+    let state = state_of(earth, Geodetic { latitude, longitude, height }, euler, velocity, rate);
     let (rate, angles) = trimmed.unwrap_or((rate, [euler[0], euler[1]]));
     let reference = Reference { rate, angles, surfaces: [0.0; 3] };
     Ok(Start { state, controls, reference, altitude: height })
+}
+
+/// A place and the attitude there as a state; `velocity` and `rate` in body axes, relative to the earth.
+fn state_of(earth: Earth, place: Geodetic, euler: Vector, velocity: Vector, rate: Vector) -> State {
+    let r = match earth {
+        Earth::Flat => [0.0, 0.0, -place.height],
+        Earth::Wgs84 => place.to_ecef(),
+    };
+    let attitude = earth.attitude(r, &from_euler(euler));
+    let c = matrix(attitude);
+    let inertial = plus(rate, earth.field(r, &c).rate);
+    let [a, b, d] = [r, velocity, inertial];
+    let e = attitude;
+    [a[0], a[1], a[2], b[0], b[1], b[2], e[0], e[1], e[2], e[3], d[0], d[1], d[2], 0.0]
 }

@@ -11,7 +11,7 @@ use super::Status;
 use super::files::{self, Kind};
 use super::flags::{whole, with_unit};
 use super::output::{digits, print_json, print_text, table};
-use crate::aircraft::flight::{FlightDocument, FlightReport, Plan, RowSink, Times, fly};
+use crate::aircraft::flight::{FlightDocument, FlightError, FlightReport, Plan, RowSink, Times, fly};
 use crate::export::atomic;
 use crate::export::table::TableWriter;
 use crate::report::figure::Envelope;
@@ -101,7 +101,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         let writer = path.as_ref().map(|path| TableWriter::create(path, &header)).transpose()?;
         Ok(Log { path, writer, lines: (run == 0 && args.plot.is_some()).then_some(&lines) })
     };
-    let report = fly(&plan, args.seed, args.runs, open)?;
+    let report = fly(&plan, args.seed, args.runs, open).map_err(|e| match e.downcast::<FlightError>() {
+        Ok(e) => anyhow::anyhow!("{}: {e}", args.flight.display()),
+        Err(e) => e,
+    })?;
     if let (Some(path), Ok(lines)) = (&args.plot, lines.into_inner()) {
         let figures = figures::sheet(&report.airplane, &header, &lines, &plan.stops());
         atomic::write(path, figures.as_bytes())?;

@@ -48,6 +48,16 @@ fn level_flight_ends_where_the_sheet_says() {
     assert!(text.contains("ended by elevator") && text.contains("ended by thrust"), "{text}");
 }
 
+/// At half the throttle the air turns this propeller from 17.7 m/s on, and its thrust is the same at any setting.
+#[test]
+fn flight_faster_than_half_the_throttle_is_found() {
+    let file = data("airplanes/ultrastick-25e-propeller.json").display().to_string();
+    let check: Value = serde_json::from_str(&bench().ok(&format!("airplane {file} --json"))).unwrap();
+    let range = &check["level_flight"];
+    assert_eq!(range["fastest_limit"], "thrust", "{range}");
+    assert!(range["fastest"].as_f64().unwrap() > 22.0, "{range}");
+}
+
 /// Measured inertias may miss the triangle by a little: read with a warning; by more than a percent they are refused.
 #[test]
 fn published_inertias_that_miss_the_triangle_are_warned_of() {
@@ -97,6 +107,13 @@ fn flight_that_is_not_possible_is_refused_by_what_is_missing() {
     refused(&bench, &trim("25 m/s", &[]), &["no lift", "stall"]);
     bench.file("airplane.json", document("aerosonde").to_string());
     refused(&bench, &["trim", "airplane.json", "--speed", "25 m/s", "--altitude", "30 km"], &["standard atmosphere"]);
+}
+
+/// Descending more steeply than the drag of a propeller at rest allows.
+#[test]
+fn a_descent_that_is_too_steep_lacks_a_brake() {
+    refused(&bench(), &trim("25 m/s", &["--climb", "-30 deg"]), &["no brake", "descend less"]);
+    refused(&bench(), &trim("25 m/s", &["--climb", "60 deg"]), &["no thrust", "at full throttle"]);
 }
 
 #[test]

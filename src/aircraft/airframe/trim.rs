@@ -139,13 +139,37 @@ impl Airplane {
             too_slow = (needed > most).then_some(error);
         }
         let alpha = (needed - lift.zero) / lift.alpha;
-        let throttle = 0.5 * self.propulsion.greatest().min(2.0 * self.mass * g);
         let turn = match request.turn {
             Turn::Rate(_) => bank,
             Turn::Bank(_) => turn_rate,
         };
-        let mut x = Unknowns::from([alpha, 0.0, turn, alpha + request.climb, 0.0, 0.0, 0.0, throttle]);
-        let residual = |x: &Unknowns| self.lacks(x, request, air.density);
+        let most = self.propulsion.greatest().min(2.0 * self.mass * g);
+        // half the throttle may lie where a propeller is turned by the air and gives the same thrust at any: then once
+        // more from full
+        let mut found = (Unknowns::zeros(), f64::INFINITY);
+        for share in [0.5, 1.0] {
+            let start = [alpha, 0.0, turn, alpha + request.climb, 0.0, 0.0, 0.0, share * most];
+            let (x, r) = self.newton(start.into(), request, air.density);
+            if r < found.1 {
+                found = (x, r);
+            }
+            if r < SOLVED {
+                break;
+            }
+        }
+        let (x, r) = found;
+        match too_slow {
+            Some(error) if r >= SOLVED => Err(error),
+            _ => {
+                let drag = pressure * self.aerodynamics.lift_and_drag(&self.size, alpha, 0.0, 0.0).1;
+                self.judge(&x, r, drag + self.mass * g * request.climb.sin(), request, air.density)
+            }
+        }
+    }
+
+    /// From a start to where no step of Newton's method makes it better, and what remains there.
+    fn newton(&self, mut x: Unknowns, request: &TrimRequest, density: f64) -> (Unknowns, f64) {
+        let residual = |x: &Unknowns| self.lacks(x, request, density);
         let mut r = residual(&x);
         for _ in 0..100 {
             let mut jacobian = SMatrix::<f64, 8, 8>::zeros();
@@ -172,10 +196,7 @@ impl Airplane {
             }
             (x, r) = (next, after);
         }
-        match too_slow {
-            Some(error) if r.amax() >= SOLVED => Err(error),
-            _ => self.judge(&x, r.amax(), request, air.density),
-        }
+        (x, r.amax())
     }
 
     /// u̇ v̇ ẇ ṗ q̇ ṙ, climb and the sideways condition at a set of unknowns.
@@ -229,8 +250,16 @@ impl Airplane {
         }
     }
 
-    /// The solution, if the controls reach it.
-    fn judge(&self, x: &Unknowns, residual: f64, request: &TrimRequest, density: f64) -> Result<Trim, TrimError> {
+    /// The solution, if the controls reach it. `wanted`: the thrust of a point mass, N, which says what is missing where
+    /// there is no solution.
+    fn judge(
+        &self,
+        x: &Unknowns,
+        residual: f64,
+        wanted: f64,
+        request: &TrimRequest,
+        density: f64,
+    ) -> Result<Trim, TrimError> {
         let speed = request.airspeed;
         let trim = Trim { residual, ..self.state(x, request, density) };
         let c = trim.controls;
@@ -265,6 +294,16 @@ impl Airplane {
         }
         let most = self.propulsion.greatest();
         let solved = residual < SOLVED;
+        let thrust = |throttle: f64| self.propulsion.running(throttle, speed, density).thrust;
+        if !solved && most.is_finite() && wanted > thrust(most) {
+            return Err(TrimError::new(
+                "thrust",
+                format!(
+                    "no thrust: steady flight at {speed} m/s needs {wanted:.1} N, there are {:.1} N at full throttle",
+                    thrust(most)
+                ),
+            ));
+        }
         if c.throttle > most || (!solved && c.throttle > 0.9 * most) {
             return Err(TrimError::new(
                 "thrust",
@@ -277,7 +316,7 @@ impl Airplane {
                 ),
             ));
         }
-        if solved && c.throttle < 0.0 {
+        if (solved && c.throttle < 0.0) || (!solved && wanted < thrust(0.0)) {
             return Err(TrimError::new(
                 "brake",
                 format!(

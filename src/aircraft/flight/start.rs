@@ -77,6 +77,9 @@ pub(super) fn start(
     earth: Earth,
     wind: Vector,
 ) -> Result<Start, FlightError> {
+    if document.trim.is_none() && document.initial.is_none() {
+        return Err(FlightError("trim: missing; give a trim or an initial state to start from".into()));
+    }
     let si = |m: &Option<Measured>| m.as_ref().map(Measured::si);
     let of_earth = match &document.earth {
         EarthEntry::Flat => [None; 3],
@@ -115,9 +118,6 @@ pub(super) fn start(
             place[1].ok_or_else(|| missing("earth.wgs84.longitude"))?,
         ),
     };
-    if document.trim.is_none() && document.initial.is_none() {
-        return Err(FlightError("trim: missing; give a trim or an initial state to start from".into()));
-    }
     let state = state_of(earth, Geodetic { latitude, longitude, height }, euler, velocity, rate);
     let (rate, angles) = trimmed.unwrap_or((rate, [euler[0], euler[1]]));
     let reference = Reference { rate, angles, surfaces: [0.0; 3] };

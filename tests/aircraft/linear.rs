@@ -226,8 +226,8 @@ fn the_regulator_brings_the_airplane_back_as_its_gains_say() {
                 names.iter().zip(up.at(time, names).into_iter().zip(down.at(time, names))).zip(expected.iter())
             {
                 let found = 0.5 * (up - down);
-                // the height, which the linear model leaves out, is felt by a part in a thousand
-                assert!((found - e).abs() < 2e-3 * expected.amax(), "{time} {name}: {found} against {e}");
+                // the height, which the linear model leaves out, is felt by 1e-3 a second
+                assert!((found - e).abs() < 5e-3 * expected.amax(), "{time} {name}: {found} against {e}");
             }
         }
     }

@@ -199,8 +199,9 @@ pub enum GustEntry {
         #[serde(skip_serializing_if = "Option::is_none")]
         airspeed: Option<Measured>,
     },
-    /// A discrete gust along the way through the air.
+    /// A discrete gust along the way through the air: at least one of u, v, w.
     #[serde(rename = "1-cos")]
+    #[schemars(extend("anyOf" = [{ "required": ["u"] }, { "required": ["v"] }, { "required": ["w"] }]))]
     Discrete {
         /// hold: MIL-F-8785C, the velocity stays; return: it goes back to zero.
         #[schemars(with = "String", extend("enum" = ["hold", "return"]))]

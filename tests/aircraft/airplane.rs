@@ -109,11 +109,14 @@ fn flight_that_is_not_possible_is_refused_by_what_is_missing() {
     refused(&bench, &["trim", "airplane.json", "--speed", "25 m/s", "--altitude", "30 km"], &["standard atmosphere"]);
 }
 
-/// Descending more steeply than the drag of a propeller at rest allows.
+/// Where no setting of the throttle is a solution: a descent steeper than the drag of a propeller at rest allows, and a
+/// speed at which the air turns the propeller at any.
 #[test]
-fn a_descent_that_is_too_steep_lacks_a_brake() {
+fn what_is_missing_is_named_where_there_is_no_solution() {
     refused(&bench(), &trim("25 m/s", &["--climb", "-30 deg"]), &["no brake", "descend less"]);
-    refused(&bench(), &trim("25 m/s", &["--climb", "60 deg"]), &["no thrust", "at full throttle"]);
+    let file = data("airplanes/ultrastick-25e-propeller.json").display().to_string();
+    let fast = ["trim", &file, "--speed", "45 m/s", "--altitude", "100 m"];
+    refused(&bench(), &fast, &["no thrust", "there are 0.0 N at full throttle"]);
 }
 
 #[test]

@@ -263,6 +263,18 @@ impl Airplane {
         let speed = request.airspeed;
         let trim = Trim { residual, ..self.state(x, request, density) };
         let c = trim.controls;
+        // beyond the stall the other controls say nothing: lift is what is missing
+        if let Some(stall) = self.aerodynamics.stall.filter(|stall| trim.alpha >= stall.angle) {
+            return Err(TrimError::new(
+                "lift",
+                format!(
+                    "no lift: steady flight at {speed} m/s needs an angle of attack of {:.1} deg, the stall is \
+                     at {:.1} deg",
+                    trim.alpha.to_degrees(),
+                    stall.angle.to_degrees()
+                ),
+            ));
+        }
         for (name, at, actuator) in [("elevator", c.elevator, 0), ("aileron", c.aileron, 1), ("rudder", c.rudder, 2)]
             .map(|(n, c, i)| (n, c, self.actuators[i]))
         {
@@ -279,18 +291,6 @@ impl Airplane {
                     ),
                 ));
             }
-        }
-        // beyond the stall the other controls say nothing: lift is what is missing
-        if let Some(stall) = self.aerodynamics.stall.filter(|stall| trim.alpha >= stall.angle) {
-            return Err(TrimError::new(
-                "lift",
-                format!(
-                    "no lift: steady flight at {speed} m/s needs an angle of attack of {:.1} deg, the stall is \
-                     at {:.1} deg",
-                    trim.alpha.to_degrees(),
-                    stall.angle.to_degrees()
-                ),
-            ));
         }
         let most = self.propulsion.greatest();
         let solved = residual < SOLVED;

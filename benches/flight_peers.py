@@ -5,11 +5,13 @@ path), FLIGHTS how many are flown for the cost (default 100). The aircraft file 
 
 What one must know of JSBSim to compare with it:
 - Its `ixz` is the negated product of inertia unless mass_balance says negated_crossproduct_inertia="false": with the wrong sign 0.6 m after 10 s.
+- It takes kg m^2 for slug ft^2 by 1.35594 in place of 1.35581795: inertia in KG*M2 comes out 9e-5 too small, so it is given in SLUG*FT2.
 - Forces must stand in body axes (X, Y, Z). LIFT, DRAG and SIDE are rotated by sideslip too and belong to another model.
 - Its gas constant and its pressure at sea level (2116.228 psf) differ: its density is 8.1e-6 above that of ISO 2533. Here density is made of its temperature
   and of its pressure, scaled to 101325 Pa.
-- A flat earth is a planet that does not rotate, large, but not so large that the altitude loses digits: 6.4e10 m leaves 1e-5 m.
-- Lengths given in metres go through a factor of eight digits: its start lies 0.6 mm (97 m of 6.4e10 m) beside ours. Positions are compared as ways.
+- A flat earth is a planet that does not rotate, large, but not so large that the altitude loses digits: at 6.4e9 m 200 m of way bend by 3e-6 m and 3e-8 rad,
+  and rounding leaves 2e-4 m; at 6.4e10 m it leaves 5e-3 m.
+- Lengths given in metres go through a factor of eight digits: its start lies 0.6 mm (9.7 m of 6.4e9 m) beside ours. Positions are compared as ways.
 - Its forces are held over a step, so that it converges to first order: differences halve with its step, and extrapolate to what both agree to.
 - Initial p, q, r are relative to the earth, as in flight.json.
 """
@@ -17,6 +19,7 @@ What one must know of JSBSim to compare with it:
 import ast
 import json
 import math
+import os
 import pathlib
 import subprocess
 import sys
@@ -29,7 +32,8 @@ import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 FT, LBF, LBFT = 0.3048, 4.4482216152605, 1.3558179483314004
-FLAT_RADIUS = 6.4e10
+SLUGFT2 = 1.3558179483314004
+FLAT_RADIUS = 6.4e9
 G = 9.80665
 R_GAS = 287.05287
 
@@ -129,14 +133,15 @@ def aircraft(folder, loaded):
                 f"<drift_rate>0.0001</drift_rate><bias>0.01</bias><output>ext/sensor{k}</output></sensor></channel>"
             )
     declared = "".join(f'<property value="0">ext/{k}</property>' for k in ("de", "da", "dr", "dt", "de-pos", "da-pos", "dr-pos"))
+    moment = {k: repr(number(v) / SLUGFT2) for k, v in inertia.items()}
     text = f"""<?xml version="1.0"?>
 <fdm_config name="peer" version="2.0" release="ALPHA">
 <fileheader><author>kfdesign</author><description>aerosonde.json</description></fileheader>
 <metrics><wingarea unit="M2">{S}</wingarea><wingspan unit="M">{b}</wingspan><chord unit="M">{c}</chord>
 <location name="AERORP" unit="M"><x>0</x><y>0</y><z>0</z></location><location name="EYEPOINT" unit="M"><x>0</x><y>0</y><z>0</z></location>
 <location name="VRP" unit="M"><x>0</x><y>0</y><z>0</z></location></metrics>
-<mass_balance negated_crossproduct_inertia="false"><ixx unit="KG*M2">{number(inertia['xx'])}</ixx><iyy unit="KG*M2">{number(inertia['yy'])}</iyy>
-<izz unit="KG*M2">{number(inertia['zz'])}</izz><ixz unit="KG*M2">{number(inertia['xz'])}</ixz><emptywt unit="KG">{number(a['mass'])}</emptywt>
+<mass_balance negated_crossproduct_inertia="false"><ixx unit="SLUG*FT2">{moment['xx']}</ixx><iyy unit="SLUG*FT2">{moment['yy']}</iyy>
+<izz unit="SLUG*FT2">{moment['zz']}</izz><ixz unit="SLUG*FT2">{moment['xz']}</ixz><emptywt unit="KG">{number(a['mass'])}</emptywt>
 <location name="CG" unit="M"><x>0</x><y>0</y><z>0</z></location></mass_balance>
 <ground_reactions/><propulsion/><flight_control name="peer">{declared}{channels}</flight_control>
 <aerodynamics>{''.join(functions)}{axes}</aerodynamics></fdm_config>"""
@@ -261,6 +266,15 @@ def fly_peer(folder, seed, duration=60.0):
     return time.process_time() - begin
 
 
+def measured(command):
+    """Wall and processor time (s) and peak memory (MB) of a program on two threads."""
+    begin = time.perf_counter()
+    child = subprocess.Popen(command, stdout=subprocess.DEVNULL, env=os.environ | {"RAYON_NUM_THREADS": "2"})
+    _, status, usage = os.wait4(child.pid, 0)
+    assert status == 0, command
+    return time.perf_counter() - begin, usage.ru_utime, usage.ru_maxrss / 1000
+
+
 def cost(program, folder, flights):
     airplane = str(ROOT / "data/airplanes/aerosonde.json")
     document = {
@@ -271,10 +285,8 @@ def cost(program, folder, flights):
         "autopilot": {"rate": "100 Hz", "delay": 1, "gains": {"kq": "0.2 s", "ktheta": 0.6, "kp": "0.06 s", "kphi": 0.6, "kr": "0.15 s"}},
     }
     (folder / "flight.json").write_text(json.dumps(document))
-    begin = time.perf_counter()
-    command = ["/usr/bin/env", "RAYON_NUM_THREADS=2", program, "fly", str(folder / "flight.json"), "--duration", "60s", "--runs", str(flights)]
-    usage = subprocess.run(["bash", "-c", "TIMEFORMAT='%U'; time \"$@\" > /dev/null", "bash", *command], check=True, capture_output=True, text=True)
-    wall, ours = time.perf_counter() - begin, float(usage.stderr.split()[-1])
+    command = [program, "fly", str(folder / "flight.json"), "--duration", "60s", "--runs"]
+    wall, ours, _ = measured([*command, str(flights)])
     peers = max(2, flights // 25)
     begin = time.perf_counter()
     with ProcessPoolExecutor(2) as pool:
@@ -282,6 +294,8 @@ def cost(program, folder, flights):
     peer_wall = time.perf_counter() - begin
     a, b = ours / (flights * 60), theirs / (peers * 60)
     print(f"\n{flights} flights of 60 s at 400 Hz on two cores: {wall:.2f} s, {ours:.2f} s of processor time, {1e3 * a:.3f} ms per flight second and core")
+    few, many = (measured([*command, str(runs)])[2] for runs in (10, 200))
+    print(f"memory at its peak: {few:.1f} MB with 10 flights, {many:.1f} MB with 200")
     print(f"JSBSim, {peers} of them: {peer_wall:.2f} s, {theirs:.2f} s of processor time, {1e3 * b:.3f} ms per flight second and core: {b / a:.1f} times ours")
 
 

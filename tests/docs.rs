@@ -3,7 +3,8 @@
 //!
 //! Blocks of one page run in order in one scratch directory that holds a copy of `data/`. `cargo run --release -- ARGS`
 //! runs the binary under test; other `cargo` and `git` lines are set-up and are not run. A line may end in `# exit 1`.
-//! A picture `![words](figures/NAME.svg "REPORT.html, TITLE")` is the figure TITLE of a report that the commands of the page wrote.
+//! A picture `![words](figures/NAME.svg "REPORT.html, TITLE")` is the figure TITLE of a report or of a
+//! sheet of figures (FIGURES.svg) that the commands of the page wrote.
 //! `KFDESIGN_UPDATE_DOCS=1 cargo test --release docs` rewrites the `text` blocks from what was printed, and the pictures.
 
 use std::path::{Path, PathBuf};
@@ -172,7 +173,12 @@ fn is_true(file: &str) {
         }
     }
     for (file, report, title) in pictures(&page) {
-        let svg = sheet(&title, &[figure(&bench.read(&report), &title).to_string()]);
+        let text = bench.read(&report);
+        let drawn = figure(&text, &title);
+        // a figure of a sheet has its place there
+        let place = drawn.strip_prefix("<svg y=\"").and_then(|rest| rest.split_once("\" "));
+        let drawn = place.map_or(drawn.to_string(), |(_, rest)| format!("<svg {rest}"));
+        let svg = sheet(&title, &[drawn]);
         if std::fs::read_to_string(&file).ok().as_deref() != Some(&svg) {
             stale.push(file.display().to_string());
             if update {

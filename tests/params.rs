@@ -331,8 +331,8 @@ pub fn accepts(schema: &Value, root: &Value, value: &Value) -> Result<(), String
             "oneOf" => {
                 rule.as_array().is_some_and(|o| o.iter().filter(|s| accepts(s, root, value).is_ok()).count() == 1)
             }
-            "minimum" => value.as_f64() >= rule.as_f64(),
-            "maximum" => value.as_f64() <= rule.as_f64(),
+            "minimum" => value.as_f64().is_none_or(|x| Some(x) >= rule.as_f64()),
+            "maximum" => value.as_f64().is_none_or(|x| Some(x) <= rule.as_f64()),
             "minItems" => value.as_array().is_none_or(|a| a.len() as u64 >= rule.as_u64().unwrap()),
             "maxItems" => value.as_array().is_none_or(|a| a.len() as u64 <= rule.as_u64().unwrap()),
             "required" => rule.as_array().unwrap().iter().all(|k| value.get(k.as_str().unwrap()).is_some()),

@@ -8,7 +8,7 @@ use anyhow::bail;
 use super::Status;
 use super::files::{self, Kind};
 use super::output::{print_json, print_report};
-use crate::aircraft::flight::{FlightDocument, Plan, RowSink, Times, fly};
+use crate::aircraft::flight::{FlightDocument, FlightError, Plan, RowSink, Times, fly};
 use crate::export::table::TableWriter;
 use crate::ops::amounts::{whole, with_unit};
 use crate::report::figure::Envelope;
@@ -99,7 +99,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         let writer = path.as_ref().map(|path| TableWriter::create(path, &header)).transpose()?;
         Ok(Log { path, writer, lines: (run == 0 && args.plot.is_some()).then_some(&lines) })
     };
-    let flown = fly(&plan, args.seed, args.runs, open)?;
+    let flown = fly(&plan, args.seed, args.runs, open).map_err(|e| match e.downcast::<FlightError>() {
+        Ok(e) => anyhow::anyhow!("{}: {e}", args.flight.display()),
+        Err(e) => e,
+    })?;
     let lines = lines.into_inner().ok().filter(|_| args.plot.is_some());
     let report = view::fly::fly(&flown, &header, lines.as_ref(), &plan.stops());
     files::write_plot(args.plot.as_deref(), &format!("Flight of {}", flown.airplane), &report)?;

@@ -28,6 +28,9 @@ pub struct Moments {
 }
 
 impl Moments {
+    /// Of no values.
+    pub const NONE: Moments = Moments { count: 0, mean: 0.0, m2: 0.0 };
+
     /// Of these values: their mean, then the squares about it, each in eight partial sums.
     #[inline(always)]
     pub fn of(x: &[f64]) -> Moments {

@@ -24,7 +24,7 @@ enum Format {
 #[derive(Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "Params")]
-pub(super) struct ParamsDocument {
+pub(crate) struct ParamsDocument {
     format: Format,
     quantity: Quantity,
     /// Frequency, for example "100 Hz".

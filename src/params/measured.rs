@@ -11,8 +11,8 @@ use super::place::{KeyError, Place, describe};
 use crate::units::{Dimension, LARGEST, Unit};
 
 /// A value with its unit as written and, if known, a 95 % interval in the same unit.
-/// Serialised as `{"value": 0.0562, "unit": "deg/s/sqrt(Hz)", "interval": [0.0555, 0.0569]}`; the short form `"0.0562 deg/s/sqrt(Hz)"` is read too.
-/// An open end of the interval is infinite, `null` in the document.
+/// Serialised as `{"value": 0.0562, "unit": "deg/s/sqrt(Hz)", "interval": [0.0555, 0.0569]}`; the short form `"0.0562
+/// deg/s/sqrt(Hz)"` is read too. An open end of the interval is infinite, `null` in the document.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measured {
     pub value: f64,
@@ -31,8 +31,8 @@ impl Measured {
     pub fn si(&self) -> f64 {
         self.unit.to_si(self.value)
     }
-    /// Less than a hundredth of a density, as the white noise that `identify` sets beside a band limit so that a filter exists: it moves the sum of
-    /// both by at most 5e-5.
+    /// Less than a hundredth of a density, as the white noise that `identify` sets beside a band limit so that a filter
+    /// exists: it moves the sum of both by at most 5e-5.
     pub fn is_floor_of(&self, whole_si: f64) -> bool {
         self.si() < 0.01 * whole_si
     }
@@ -55,7 +55,8 @@ impl Measured {
         Err(format!("{} {} is {end} than any sensor's: expected a size of 1e-30 to 1e30 in SI", self.value, self.unit))
     }
 
-    /// A positive value from a text such as `0.0562 deg/s/sqrt(Hz)`, with its dimension checked; an error says what is wrong.
+    /// A positive value from a text such as `0.0562 deg/s/sqrt(Hz)`, with its dimension checked; an error says what is
+    /// wrong.
     pub fn positive(text: &str, expected: Dimension) -> Result<Measured, String> {
         let measured = short_form(text)?;
         measured.unit.require(expected).map_err(|e| e.to_string())?;
@@ -175,6 +176,22 @@ impl JsonSchema for Measured {
                 },
                 { "type": "string", "pattern": "^\\s*[-+]?[0-9.][-+.0-9eE]*\\s+\\S" }
             ]
+        })
+    }
+}
+
+/// How a plain number stands in a document: 0.23 or "0.23"; [`Place::plain`] reads it.
+#[derive(Debug)]
+pub(crate) struct Plain;
+
+impl JsonSchema for Plain {
+    fn schema_name() -> Cow<'static, str> {
+        "Plain".into()
+    }
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "description": "A number without a unit, 0.23 or \"0.23\".",
+            "anyOf": [{ "type": "number" }, { "type": "string", "pattern": "^\\s*[-+]?[0-9.][-+.0-9eE]*\\s*$" }]
         })
     }
 }

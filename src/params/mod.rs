@@ -24,9 +24,9 @@ pub use design::{
     AidDrift, AidEntry, AttitudeEntry, CustomEntry, Design, MotionEntry, NamedEntry, PLANTS, PlantEntry, StateEntry,
     check_name, unknown_plant,
 };
-pub(crate) use document::quantity;
+pub(crate) use document::{ParamsDocument, quantity};
 pub use measured::Measured;
-pub(crate) use measured::Range;
+pub(crate) use measured::{Plain, Range};
 use place::{KeyError, Place};
 
 /// One noise term as documented: kind with its coefficients as [`Measured`].
@@ -330,6 +330,6 @@ impl Params {
     }
     /// The published JSON schema.
     pub fn schema() -> serde_json::Value {
-        schemars::schema_for!(document::ParamsDocument).to_value()
+        schemars::schema_for!(ParamsDocument).to_value()
     }
 }

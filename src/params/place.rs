@@ -2,6 +2,8 @@
 //!
 //! Keys that are not known are refused by name, keys that stand twice are refused by the parser.
 
+use std::path::Path;
+
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Value};
 
@@ -22,6 +24,42 @@ pub struct SyntaxError {
     pub line: usize,
     pub column: usize,
     pub message: String,
+}
+
+/// A document that cannot be used; the key is the path inside it.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum DocumentError {
+    #[error("{path}: cannot read: {reason}")]
+    Read { path: String, reason: String },
+    #[error("{path}: {error}")]
+    Syntax { path: String, error: SyntaxError },
+    #[error("{path}: {error}")]
+    Key { path: String, error: KeyError },
+}
+
+/// A document from its text by the reader of its root; every complaint names `path` and the key.
+pub fn document<T>(
+    text: &str,
+    path: &str,
+    read: impl FnOnce(&Place<'_>) -> Result<T, KeyError>,
+) -> Result<T, DocumentError> {
+    let value = parse(text).map_err(|error| DocumentError::Syntax { path: path.into(), error })?;
+    read(&Place::root(&value)).map_err(|error| DocumentError::Key { path: path.into(), error })
+}
+
+/// The same from a file.
+pub fn read<T>(path: &Path, read: impl FnOnce(&Place<'_>) -> Result<T, KeyError>) -> Result<T, DocumentError> {
+    let (text, shown) = file(path)?;
+    document(&text, &shown, read)
+}
+
+/// The text of a file and its path as messages show it. Errors: it cannot be read.
+pub fn file(path: &Path) -> Result<(String, String), DocumentError> {
+    let shown = path.display().to_string();
+    match std::fs::read_to_string(path) {
+        Ok(text) => Ok((text, shown)),
+        Err(e) => Err(DocumentError::Read { path: shown, reason: e.to_string() }),
+    }
 }
 
 /// Parse JSON in which no object has a key twice. Its keys and texts are [`plain`] from here on.
@@ -90,7 +128,8 @@ impl<'a> Place<'a> {
         };
         Ok(values.iter().enumerate().map(|(i, v)| Place { key: format!("{}[{i}]", self.key), value: v }).collect())
     }
-    /// The elements of a list, or the one object that stands for a list of one; what is neither stands for itself, so that its reader says what it expects.
+    /// The elements of a list, or the one object that stands for a list of one; what is neither stands for itself, so
+    /// that its reader says what it expects.
     pub fn one_or_many(&self) -> Result<Vec<Place<'a>>, KeyError> {
         if self.value.is_array() { self.list() } else { Ok(vec![self.clone()]) }
     }
@@ -110,6 +149,11 @@ impl<'a> Place<'a> {
             .as_f64()
             .filter(|x| x.is_finite())
             .ok_or_else(|| self.error(format!("expected a number, found {}", describe(self.value))))
+    }
+    /// A plain number: 0.23 or "0.23".
+    pub fn plain(&self) -> Result<f64, KeyError> {
+        let text = self.value.as_str().and_then(|text| text.trim().parse::<f64>().ok()).filter(|x| x.is_finite());
+        text.map_or_else(|| self.number(), Ok)
     }
     /// A whole number, not negative.
     pub fn count(&self) -> Result<u64, KeyError> {

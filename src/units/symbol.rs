@@ -114,8 +114,8 @@ pub(super) fn hint(name: &str) -> String {
             "a count is no unit; give the size of one count, for example \"1/131 deg/s\""
         }
         _ => {
-            "known are rad, deg, arcmin, arcsec, rev, dps, rpm, m, g, s, min, h, Hz, K with prefixes (mdps, ug, kHz), \
-             for example deg/s, deg/s/sqrt(Hz), deg/sqrt(h), m/s^2, ug/sqrt(Hz)"
+            "known are rad, deg, arcmin, arcsec, rev, dps, rpm, m, ft, kt, g, s, min, h, Hz, K, kg, N, V, A, ohm with \
+             prefixes (mdps, ug, kHz), for example deg/s, deg/s/sqrt(Hz), deg/sqrt(h), m/s^2, ug/sqrt(Hz)"
         }
     };
     text.to_string()

@@ -48,6 +48,30 @@ fn level_flight_ends_where_the_sheet_says() {
     assert!(text.contains("ended by elevator") && text.contains("ended by thrust"), "{text}");
 }
 
+/// At half the throttle the air turns this propeller from 17.7 m/s on, and its thrust is the same at any setting.
+#[test]
+fn flight_faster_than_half_the_throttle_is_found() {
+    let file = data("airplanes/ultrastick-25e-propeller.json").display().to_string();
+    let check: Value = serde_json::from_str(&bench().ok(&format!("airplane {file} --json"))).unwrap();
+    let range = &check["level_flight"];
+    assert_eq!(range["fastest_limit"], "thrust", "{range}");
+    assert!(range["fastest"].as_f64().unwrap() > 22.0, "{range}");
+}
+
+/// Measured inertias may miss the triangle by a little: read with a warning; by more than a percent they are refused.
+#[test]
+fn published_inertias_that_miss_the_triangle_are_warned_of() {
+    let text = Bench::new().ok(&format!("airplane {}", data("airplanes/ultrastick-25e.json").display()));
+    assert!(text.contains("largest principal moment is 0.3 % above the sum"), "{text}");
+    let text = Bench::new().ok(&format!("airplane {}", data("airplanes/aerosonde.json").display()));
+    assert!(!text.contains("principal moment is"), "{text}");
+    let bench = Bench::new();
+    let mut more = document("ultrastick-25e");
+    more["inertia"]["zz"] = json!("0.156 kg m^2");
+    bench.file("airplane.json", more.to_string());
+    refused(&bench, &["airplane", "airplane.json"], &["airplane.json: inertia", "belong to no body"]);
+}
+
 #[test]
 fn trim_writes_one_document_and_a_page() {
     let bench = bench();
@@ -76,7 +100,23 @@ fn flight_that_is_not_possible_is_refused_by_what_is_missing() {
     refused(&bench, &trim("25 m", &[]), &["--speed 25 m", "a velocity"]);
     refused(&bench, &trim("25 m/s", &["--bank", "10 deg", "--lateral", "wings_level"]), &["two angles of bank"]);
     refused(&bench, &["trim", "airplane.json", "--speed", "25 m/s"], &["--altitude"]);
+    // 25 m/s needs 3.1 deg
+    let mut early = document("aerosonde");
+    early["aerodynamics"]["stall"]["angle"] = json!("2 deg");
+    bench.file("airplane.json", early.to_string());
+    refused(&bench, &trim("25 m/s", &[]), &["no lift", "stall"]);
+    bench.file("airplane.json", document("aerosonde").to_string());
     refused(&bench, &["trim", "airplane.json", "--speed", "25 m/s", "--altitude", "30 km"], &["standard atmosphere"]);
+}
+
+/// Where no setting of the throttle is a solution: a descent steeper than the drag of a propeller at rest allows, and a
+/// speed at which the air turns the propeller at any.
+#[test]
+fn what_is_missing_is_named_where_there_is_no_solution() {
+    refused(&bench(), &trim("25 m/s", &["--climb", "-30 deg"]), &["no brake", "descend less"]);
+    let file = data("airplanes/ultrastick-25e-propeller.json").display().to_string();
+    let fast = ["trim", &file, "--speed", "45 m/s", "--altitude", "100 m"];
+    refused(&bench(), &fast, &["no thrust", "there are 0.0 N at full throttle"]);
 }
 
 #[test]
@@ -99,6 +139,13 @@ fn a_wrong_document_is_refused_by_its_key() {
         },
         &["aerodynamics.yaw.beta", "missing", "would mean that sideslip makes no yawing moment"],
     );
+    for (key, value) in [("frequency", "0 rad/s"), ("damping", "0"), ("rate_limit", "-1 rad/s")] {
+        wrong(&|d| d["actuators"]["rudder"][key] = json!(value), &["actuators.rudder", key, "more than zero"]);
+    }
+    wrong(&|d| d["actuators"]["rudder"]["delay"] = json!("-1 ms"), &["actuators.rudder.delay", "zero or more"]);
+    wrong(&|d| d["actuators"]["rudder"]["limit"] = json!("-5 deg"), &["actuators.rudder", "lower stop"]);
+    wrong(&|d| d["aerodynamics"]["stall"]["sharpness"] = json!("-5"), &["stall.sharpness", "more than zero"]);
+    wrong(&|d| d["reference"]["chord"] = json!("0 m"), &["reference.chord", "more than zero"]);
     wrong(&|d| d["aerodynamics"]["pitch"]["alhpa"] = json!("1 1/rad"), &["alhpa", "did you mean 'alpha'"]);
 }
 

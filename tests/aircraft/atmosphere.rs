@@ -1,7 +1,7 @@
 //! Standard atmosphere and discrete gusts against tables.
 
 use kfdesign::aircraft::atmosphere::discrete::{DiscreteGust, Form};
-use kfdesign::aircraft::atmosphere::standard::{at, at_geopotential, geopotential};
+use kfdesign::aircraft::atmosphere::standard::{DensityNear, at, at_geopotential, geopotential};
 
 fn close(found: f64, expected: f64, relative: f64) {
     assert!((found - expected).abs() <= relative * expected.abs(), "{found} against {expected}");
@@ -50,6 +50,23 @@ fn both_layers_meet_and_what_is_outside_is_refused() {
         assert!(message.contains("-2000 m to 20000 m"), "{message}");
     }
     assert!(at(20_060.0).is_ok() && at(20_100.0).is_err());
+}
+
+/// Over its reach the series is the density to rounding, and it ends where the layers meet.
+#[test]
+fn the_density_near_a_height_is_the_density() {
+    for height in [-1500.0, 0.0, 100.0, 5000.0, 10_000.0, 12_000.0, 19_000.0] {
+        let near = DensityNear::new(height).unwrap();
+        for away in [-DensityNear::REACH, -0.3, 0.0, 0.5, DensityNear::REACH] {
+            close(near.at(height + away), at(height + away).unwrap().density, 1e-12);
+            assert!(near.reaches(height + away) && !near.reaches(height + away.signum() * 1.01));
+        }
+    }
+    // 11 km of geopotential height
+    let bend = 11_019.067_9;
+    let below = DensityNear::new(bend - 0.1).unwrap();
+    assert!(below.reaches(bend - 0.2) && !below.reaches(bend + 0.1));
+    assert!(DensityNear::new(21_000.0).is_err() && DensityNear::new(f64::NAN).is_err());
 }
 
 #[test]

@@ -56,7 +56,9 @@ fn every_format_holds_the_same_rows_and_runs_have_files_of_their_own() {
     }
     let text = bench.read("a.csv");
     assert_eq!(text.lines().count(), 102);
-    assert!(text.starts_with("time (s),north (m),east (m),down (m),u (m/s),v (m/s),w (m/s),phi (rad),theta (rad),psi (rad),p (rad/s),q (rad/s),r (rad/s),elevator (rad),aileron (rad),rudder (rad),throttle,gust_u (m/s)"));
+    let header = "time (s),north (m),east (m),down (m),u (m/s),v (m/s),w (m/s),phi (rad),theta (rad),psi (rad),\
+                  p (rad/s),q (rad/s),r (rad/s),elevator (rad),aileron (rad),rudder (rad),throttle,gust_u (m/s)";
+    assert!(text.starts_with(header));
     assert!(text.lines().last().unwrap().starts_with("1,"));
     let report: Value =
         serde_json::from_str(&bench.ok("fly flight.json -o r.csv --duration 1s --seed 5 --runs 3 --json")).unwrap();
@@ -83,6 +85,17 @@ fn what_cannot_be_flown_is_refused_in_one_line() {
         gust.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
         change("gusts", gust)
     };
+    let pilot = |more: Value| {
+        let mut document = document();
+        document["autopilot"].as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        document
+    };
+    let lqr = |states: Value, elevator: u32| {
+        json!({
+            "longitudinal": { "states": states, "elevator": elevator },
+            "lateral": { "states": [0, 0, 0, 0], "aileron": 1, "rudder": 1 }
+        })
+    };
     let rows: Vec<(Value, &str, &[&str])> = vec![
         (trim("25 km", "25 m/s"), "", &["flight.json: trim:", "altitude 24902", "-2000 m to 20000 m"]),
         (trim("100 m", "25"), "", &["trim.airspeed", "\"25\""]),
@@ -101,6 +114,18 @@ fn what_cannot_be_flown_is_refused_in_one_line() {
         (change("control", json!({})), "", &["unknown key", "did you mean 'controls'"]),
         (change("airplane", json!("none.json")), "", &["airplane", "none.json", "cannot read"]),
         (change("controls", json!("none.csv")), "", &["none.csv", "cannot read"]),
+        (change("controls", json!("short.csv")), "--duration 4s", &["short.csv: ends at 3 s, before the 4 s"]),
+        (change("ground", json!("200 m")), "", &["altitude: 100 m is below the ground at 200 m"]),
+        (trim("1000 m", "25 m/s"), "", &["gusts[0]", "1000 m (3281 ft)", "needs std_dev", "or exceedance"]),
+        (dryden(json!({ "exceedance": 0.3 })), "", &["gusts[0]: exceedance 0.3", "curves for"]),
+        (dryden(json!({ "exceedance": 1e-3, "std_dev": "1 m/s" })), "", &["gusts.exceedance", "beside std_dev"]),
+        (pilot(json!({ "gains": null })), "", &["autopilot: expected one of gains and lqr"]),
+        (
+            pilot(json!({ "gains": null, "lqr": lqr(json!([1, 1, 1]), 1) })),
+            "",
+            &["longitudinal.states", "u, w, q, theta"],
+        ),
+        (pilot(json!({ "gains": null, "lqr": lqr(json!([1, 1, 1, 1]), 0) })), "", &["elevator", "more than zero"]),
         (quiet.clone(), "--duration 1.003s", &["duration 1.003 s is no whole number of samples at 100 Hz"]),
         (quiet.clone(), "--every 3ms", &["every 0.003 s"]),
         (quiet.clone(), "--duration -1s", &["duration -1 s: expected a positive time"]),
@@ -115,25 +140,56 @@ fn what_cannot_be_flown_is_refused_in_one_line() {
     ];
     for (document, flags, words) in rows {
         let bench = Bench::new();
+        bench.file("short.csv", "time (s),throttle\n0,0.7\n3,0.8\n");
         bench.file("flight.json", document.to_string());
         let out = bench.run(&format!("fly flight.json -o out.csv {flags}"));
         assert_eq!(out.status, 2, "{document}\n{out:?}");
         assert_eq!(out.stderr.lines().count(), 1, "{out:?}");
         assert!(words.iter().all(|word| out.stderr.contains(word)), "{words:?}\n{out:?}");
+        assert_eq!(bench.files(), ["flight.json", "short.csv"]);
+    }
+}
+
+/// No row is left of a flight that meets the ground or leaves the standard atmosphere; the message says when. The dive
+/// goes through 40 m at 30 m/s and steeply, in between one and two seconds.
+#[test]
+fn the_ground_and_the_end_of_the_atmosphere_are_said_with_their_time() {
+    for (ground, altitude, u, theta, words) in [
+        ("0 m", "40 m", "30 m/s", "-60 deg", "at 1.* s: the airplane meets the ground, which is at 0 m;"),
+        ("500 m", "540 m", "30 m/s", "-60 deg", "at 1.* s: the airplane meets the ground, which is at 500 m;"),
+        ("0 m", "20050 m", "300 m/s", "80 deg", "at 0.* s: altitude 20000.* m (geopotential) is outside the standard"),
+        ("600 m", "540 m", "30 m/s", "0 deg", "altitude: 540 m is below the ground at 600 m;"),
+    ] {
+        let bench = Bench::new();
+        let mut dive = level();
+        dive["airplane"] = json!(data("airplanes/aerosonde.json"));
+        dive["initial"] = json!({ "altitude": altitude, "u": u, "theta": theta });
+        dive["ground"] = json!(ground);
+        bench.file("flight.json", dive.to_string());
+        let out = bench.run("fly flight.json -o out.csv --duration 60s");
+        assert_eq!((out.status, out.stderr.lines().count()), (2, 1), "{out:?}");
+        let mut rest = out.stderr.as_str();
+        for word in words.split('*') {
+            let found = rest.find(word).unwrap_or_else(|| panic!("{words}: {out:?}"));
+            rest = &rest[found + word.len()..];
+        }
         assert_eq!(bench.files(), ["flight.json"]);
     }
 }
 
-/// Rows are only written while the airplane is in the standard atmosphere; a dive out of it says when.
+/// Turbulence is that of the height above the ground.
 #[test]
-fn leaving_the_atmosphere_is_said_with_its_time() {
-    let bench = Bench::new();
-    let mut dive = level();
-    dive["airplane"] = json!(data("airplanes/aerosonde.json"));
-    dive["initial"] = json!({ "altitude": "-1900 m", "u": "30 m/s", "theta": "-60 deg" });
-    bench.file("flight.json", dive.to_string());
-    let out = bench.run("fly flight.json -o out.csv --duration 60s");
-    assert_eq!(out.status, 2);
-    assert!(out.stderr.contains("at ") && out.stderr.contains("outside the standard atmosphere"), "{out:?}");
-    assert_eq!(bench.files(), ["flight.json"]);
+fn heights_of_gusts_are_above_the_ground() {
+    let bench = bench();
+    let figures = |ground: &str, altitude: &str| {
+        let mut document = document();
+        document["trim"]["altitude"] = json!(altitude);
+        document["ground"] = json!(ground);
+        bench.file("flight.json", document.to_string());
+        let rows: Value = serde_json::from_str(&bench.ok("fly flight.json --duration 5s --json")).unwrap();
+        let columns = rows["runs"][0]["columns"].as_array().unwrap();
+        columns.iter().find(|c| c["name"] == "gust_w (m/s)").unwrap()["std_dev"].as_f64().unwrap()
+    };
+    let (low, high, nearer) = (figures("0 m", "100 m"), figures("500 m", "600 m"), figures("50 m", "100 m"));
+    assert!((low / high - 1.0).abs() < 1e-6 && (low / nearer - 1.0).abs() > 1e-3, "{low} {high} {nearer}");
 }

@@ -78,7 +78,8 @@ pub fn thrown() -> Value {
         "format": "kfdesign-flight/1",
         "airplane": "aerosonde.json",
         "initial": {
-            "altitude": "100 m", "u": "25 m/s", "v": "1 m/s", "w": "1.5 m/s", "phi": "10 deg", "theta": "5 deg", "psi": "30 deg",
+            "altitude": "100 m", "u": "25 m/s", "v": "1 m/s", "w": "1.5 m/s",
+            "phi": "10 deg", "theta": "5 deg", "psi": "30 deg",
             "p": "0.2 rad/s", "q": "-0.1 rad/s", "r": "0.1 rad/s"
         },
         "controls": { "elevator": "-0.14 rad", "aileron": "0.02 rad", "rudder": "-0.01 rad", "throttle": "0.8" }

@@ -368,6 +368,23 @@ fn an_accelerometer_feels_its_lever_arm() {
     near(&one(&document, times(0.1, None, None)).last(&accel), &[0.528067687, 0.005195466, -9.792420628], 1e-8);
 }
 
+/// A tube at the wing tip of an airplane that yaws is faster or slower by r times its arm.
+#[test]
+fn an_airspeed_sensor_feels_its_lever_arm() {
+    let at = |arm: &str| {
+        let mut document = level();
+        document["airplane"] = aerosonde();
+        document["airplane"]["positions"] = json!({ "airspeed": ["0 m", arm, "0 m"] });
+        document["trim"]["bank"] = json!("30 deg");
+        document["sensors"] = json!({ "airspeed": "1e-30 m/s" });
+        one(&document, times(0.1, None, None)).at(0.0, &["airspeed", "u", "v", "w", "p", "r"])
+    };
+    let [speed, u, v, w, p, r] = at("-1 m")[..] else { panic!() };
+    // (p, q, r) × (0, −1, 0) = (r, 0, −p)
+    assert!((speed - ((u + r).powi(2) + v * v + (w - p).powi(2)).sqrt()).abs() < 1e-12);
+    assert!((at("0 m")[0] - 25.0).abs() < 1e-9 && (speed - 25.0).abs() > 0.15);
+}
+
 /// With one sample of delay the servo receives the command of sample k from sample k + 1 on.
 #[test]
 fn a_command_comes_as_late_as_the_document_says() {

@@ -51,7 +51,8 @@ fn the_length_of_the_steps_changes_nothing() {
     }
 }
 
-/// Against fine Runge–Kutta steps of the law as it is written, for damping below, at and above one, with stops in the way.
+/// Against fine Runge–Kutta steps of the law as it is written, for damping below, at and above one, with stops in the
+/// way.
 #[test]
 fn a_second_integration_agrees() {
     for damping in [0.3, 0.7, 1.0, 1.8] {

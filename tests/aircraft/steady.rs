@@ -1,4 +1,5 @@
-//! Steady flight, the linear models about it, modes, controllability, optimal gains: against the figures of a second implementation.
+//! Steady flight, the linear models about it, modes, controllability, optimal gains: against the figures of a second
+//! implementation.
 
 use kfdesign::aircraft::airframe::Airplane;
 use kfdesign::aircraft::airframe::levels::{Category, criteria};
@@ -45,15 +46,21 @@ type Steady = ([f64; 3], [f64; 7], [f64; 4], [f64; 8]);
 
 #[rustfmt::skip]
 const TRIMS: [Steady; 4] = [
-    // airspeed, climb, turn rate; alpha phi theta elevator aileron rudder throttle; thrust torque rate current; u w p q r F/m
+    // airspeed, climb, turn rate; alpha phi theta elevator aileron rudder throttle; thrust torque rate current; u w p q
+    // r F/m
     ([25.0, 0.0, 0.0], [0.053873983, -0.000530560, 0.053873975, -0.135469407, 0.006129659, -0.000977192, 0.777789841],
-     [10.352416, 0.627798, 517.33881, 11.03272], [24.963728699, 1.346198144, 0.0, 0.0, 0.0, 0.528067687, 0.005195466, -9.792420628]),
+     [10.352416, 0.627798, 517.33881, 11.03272], [24.963728699, 1.346198144, 0.0, 0.0, 0.0, 0.528067687, 0.005195466,
+     -9.792420628]),
     ([18.0, 0.0, 0.0], [0.144038920, -0.000356097, 0.144038911, -0.385016809, 0.007865283, -0.001253886, 0.585720825],
-     [7.427940, 0.417603, 389.88409, 7.84103], [17.813597718, 2.583744637, 0.0, 0.0, 0.0, 1.407659876, 0.003455951, -9.705094845]),
+     [7.427940, 0.417603, 389.88409, 7.84103], [17.813597718, 2.583744637, 0.0, 0.0, 0.0, 1.407659876, 0.003455951,
+     -9.705094845]),
     ([25.0, 5.0, 0.0], [0.053051955, -0.000888323, 0.140318396, -0.133194299, 0.010176864, -0.001622399, 0.865462667],
-     [19.743292, 1.042312, 572.43255, 17.32684], [24.964826877, 1.325676808, 0.0, 0.0, 0.0, 1.371542269, 0.008625855, -9.710261666]),
-    ([25.0, 0.0, 0.226474881], [0.068701125, 0.530265321, 0.059290445, -0.193216799, -0.012298754, -0.012865697, 0.782462266],
-     [10.824777, 0.649111, 520.28251, 11.35634], [24.941025145, 1.716177359, -0.013419931, 0.114341174, 0.195030441, 0.777329776, -0.063827955, -11.296851923]),
+     [19.743292, 1.042312, 572.43255, 17.32684], [24.964826877, 1.325676808, 0.0, 0.0, 0.0, 1.371542269, 0.008625855,
+     -9.710261666]),
+    ([25.0, 0.0, 0.226474881], [0.068701125, 0.530265321, 0.059290445, -0.193216799, -0.012298754, -0.012865697,
+     0.782462266],
+     [10.824777, 0.649111, 520.28251, 11.35634], [24.941025145, 1.716177359, -0.013419931, 0.114341174, 0.195030441,
+     0.777329776, -0.063827955, -11.296851923]),
 ];
 
 #[test]
@@ -284,7 +291,8 @@ fn step_responses_are_those_of_the_sheet() {
         let model = if input < 2 { along } else { across };
         near(&after(&model.a, &column(&model.b, input % 2, by), t), &expected, 2e-8);
     }
-    // up-gust of 3 m/s over 25 m, w_g = −1.5 (1 − cos 2πt): states of the gust beside those of the airplane, g'' = −4π²(g + 1.5)
+    // up-gust of 3 m/s over 25 m, w_g = −1.5 (1 − cos 2πt): states of the gust beside those of the airplane, g'' =
+    // −4π²(g + 1.5)
     let mut joined = DMatrix::zeros(7, 7);
     joined.view_mut((0, 0), (4, 4)).copy_from(&along.a);
     (0..4).for_each(|i| joined[(i, 4)] = along.e[(i, 1)]);
@@ -364,7 +372,8 @@ fn optimal_gains_are_those_of_the_sheet() {
     assert!(regulator(&across.a, &nothing, &diagonal(&[1.0; 4]), &diagonal(&[1.0])).is_err());
 }
 
-/// CAP 10.497603 is beyond Level 2 of category B, and Level 1 at N = 3.799, the span of a light four-seater; the spiral goes from Level 2 to Level 1.
+/// CAP 10.497603 is beyond Level 2 of category B, and Level 1 at N = 3.799, the span of a light four-seater; the spiral
+/// goes from Level 2 to Level 1.
 #[test]
 fn levels_as_flown_and_scaled() {
     let airplane = aerosonde();

@@ -54,8 +54,8 @@ fn another_sensor_changes_no_gust_and_no_other_sensor() {
     }
 }
 
-/// Errors are what stands in the document: standard deviations over 200 s within 5 standard errors (6 of them: a false alarm in 1 of 290,000 such tests), and
-/// GNSS measures every 20th sample.
+/// Errors are what stands in the document: standard deviations over 200 s within 5 standard errors (6 of them: a false
+/// alarm in 1 of 290,000 such tests), and GNSS measures every 20th sample.
 #[test]
 fn measurements_have_the_errors_of_the_document() {
     let table = runs(&gusty(), times(200.0, None, None), 3, 1).unwrap().remove(0);

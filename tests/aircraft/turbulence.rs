@@ -1,6 +1,7 @@
 //! Dryden turbulence: closed forms, a second implementation's numbers, and simulated paths against exact covariances.
 
 use kfdesign::aircraft::atmosphere::dryden::{Dryden, Intensity, STATES, Specification};
+use kfdesign::aircraft::atmosphere::exceedance::std_dev;
 use kfdesign::aircraft::atmosphere::turbulence::Turbulence;
 use kfdesign::numerics::distribution::chi_square_quantile;
 use kfdesign::numerics::random::{StreamId, stream};
@@ -160,7 +161,8 @@ fn the_discrete_form_is_exact() {
     close(&[q[(6, 6)]], &[8.236_398_664e-6], 1e-9);
 }
 
-/// Two steps are one of twice the length, and the stationary covariance stays: also for steps so short that entries of Q differ by 1e-12.
+/// Two steps are one of twice the length, and the stationary covariance stays: also for steps so short that entries of
+/// Q differ by 1e-12.
 #[test]
 fn steps_compose_however_short_they_are() {
     let model = reference().model();
@@ -202,6 +204,33 @@ fn heights_without_turbulence_are_refused_and_between_it_is_linear() {
     close(&make(5_000.0, None, Some(1.5)).unwrap().std_devs, &[1.5; 3], 1e-15);
 }
 
+/// Figures read off the chart of MIL-F-8785C as JSBSim holds them, and between its heights.
+#[test]
+fn intensity_aloft_is_that_of_the_chart() {
+    let ft = 0.3048;
+    let at = |probability: f64, feet: f64| std_dev(probability, feet * ft);
+    for (probability, feet, expected) in [
+        (1e-2, 3750.0, 7.4),
+        (1e-3, 7500.0, 10.1),
+        (1e-5, 35_000.0, 16.0),
+        (0.2, 2000.0, 2.2 - 0.7 * 250.0 / 2000.0),
+        // lengths and intensities of less than 2000 ft go over to this
+        (1e-2, 1000.0, 6.9 + 0.5 * 250.0 / 2000.0),
+        (1e-6, 65_000.0, 10.7),
+        (1e-3, 60_000.0, 1.35),
+    ] {
+        close(&[at(probability, feet).unwrap()], &[expected * ft], 1e-12);
+    }
+    for (probability, feet, words) in [
+        (0.5, 3000.0, "curves for 0.2, 0.1, 0.01, 0.001, 0.0001, 0.00001, 0.000001"),
+        (1e-2, 45_000.0, "give a smaller exceedance"),
+        (1e-6, 81_000.0, "ends at 80000 ft"),
+    ] {
+        let message = at(probability, feet).unwrap_err().to_string();
+        assert!(message.contains(words), "{message}");
+    }
+}
+
 fn path(seed: u64, run: u64, dt: f64) -> Turbulence {
     let streams = [0, 1, 2, 3].map(|axis| stream(seed, StreamId { run, axis, term: 0 }));
     Turbulence::new(&reference().model(), dt, streams).unwrap()
@@ -212,8 +241,8 @@ fn vector(t: &Turbulence) -> SVector<f64, 6> {
     SVector::from([g.velocity[0], g.velocity[1], g.velocity[2], g.rate[0], g.rate[1], g.rate[2]])
 }
 
-/// Covariances of 8000 independent paths at their first sample, at the 40th, and between both. 108 means of products, each within 5 standard errors: a
-/// false alarm in 1 of 16,000 such tests.
+/// Covariances of 8000 independent paths at their first sample, at the 40th, and between both. 108 means of products,
+/// each within 5 standard errors: a false alarm in 1 of 16,000 such tests.
 #[test]
 fn simulated_covariances_are_the_exact_ones() {
     const RUNS: u64 = 8000;
@@ -247,8 +276,8 @@ fn simulated_covariances_are_the_exact_ones() {
     check("lag", &lagged, &|run, i, j| pairs[run].1[i] * pairs[run].0[j]);
 }
 
-/// Mean periodograms of 400 paths of 10 s against their exact expectation, which the exact autocovariance gives: 6 gusts at 4 frequencies, 1e-5 each, a false
-/// alarm in 1 of 4,000 such tests.
+/// Mean periodograms of 400 paths of 10 s against their exact expectation, which the exact autocovariance gives: 6
+/// gusts at 4 frequencies, 1e-5 each, a false alarm in 1 of 4,000 such tests.
 #[test]
 fn simulated_spectra_are_the_exact_ones() {
     const RUNS: u64 = 400;

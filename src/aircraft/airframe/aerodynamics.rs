@@ -1,7 +1,8 @@
 //! Forces and moments of the air by derivatives, with stall.
 //!
-//! α = atan2(w, u), β = asin(v/V), p̂ = bp/2V, q̂ = cq/2V, r̂ = br/2V. CL blends the linear lift CL0 + CLα α into that of a flat plate behind the stall
-//! (Beard and McLain 2012, section 4.2); drag is a parasitic part and one of the lift. Rotation into body axes by α alone, the side force in body axes.
+//! α = atan2(w, u), β = asin(v/V), p̂ = bp/2V, q̂ = cq/2V, r̂ = br/2V. CL blends the linear lift CL0 + CLα α into that
+//! of a flat plate behind the stall (Beard and McLain 2012, section 4.2); drag is a parasitic part and one of the lift.
+//! Rotation into body axes by α alone, the side force in body axes.
 
 use std::f64::consts::PI;
 
@@ -45,7 +46,8 @@ pub enum Drag {
     Polar { factor: f64, least: f64 },
 }
 
-/// Sharpness M and angle α0 (rad) of the blend σ = (1 + e₁ + e₂)/((1 + e₁)(1 + e₂)), e₁ = e^(−M(α − α0)), e₂ = e^(M(α + α0)).
+/// Sharpness M and angle α0 (rad) of the blend σ = (1 + e₁ + e₂)/((1 + e₁)(1 + e₂)), e₁ = e^(−M(α − α0)), e₂ = e^(M(α +
+/// α0)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stall {
     pub sharpness: f64,
@@ -67,12 +69,27 @@ pub struct Aerodynamics {
     pub stall: Option<Stall>,
 }
 
+/// atan2(y, x); where |y| ≤ x/5, as in flight, by the series of the arctangent, of which 11 terms are the whole to
+/// rounding.
+#[inline(always)]
+fn direction(y: f64, x: f64) -> f64 {
+    if x > 0.0 && y.abs() <= 0.2 * x {
+        let t = y / x;
+        let z = t * t;
+        let q = z * z;
+        let even = 1.0 + q * (1.0 / 5.0 + q * (1.0 / 9.0 + q * (1.0 / 13.0 + q * (1.0 / 17.0 + q * (1.0 / 21.0)))));
+        let odd = 1.0 / 3.0 + q * (1.0 / 7.0 + q * (1.0 / 11.0 + q * (1.0 / 15.0 + q * (1.0 / 19.0))));
+        t * (even - z * odd)
+    } else {
+        y.atan2(x)
+    }
+}
+
 impl Stall {
     /// 0 far below the stall, 1 far above.
+    #[inline(always)]
     pub fn blend(&self, alpha: f64) -> f64 {
-        let both = (self.sharpness * self.angle).exp();
-        let one = (self.sharpness * alpha).exp();
-        let (a, b) = (both / one, both * one);
+        let [a, b] = [self.angle - alpha, self.angle + alpha].map(|below| (self.sharpness * below).exp());
         // (1 + a + b)/((1 + a)(1 + b)) without products of large numbers
         let (x, y) = (1.0 / (1.0 + a), 1.0 / (1.0 + b));
         x + y - x * y
@@ -80,6 +97,7 @@ impl Stall {
 }
 
 impl Lateral {
+    #[inline(always)]
     fn at(&self, beta: f64, p: f64, r: f64, controls: &Controls) -> f64 {
         self.zero
             + self.beta * beta
@@ -93,37 +111,46 @@ impl Lateral {
 impl Aerodynamics {
     /// CL and CD at an angle of attack (rad), a pitch rate q̂ and an elevator (rad).
     pub fn lift_and_drag(&self, size: &Size, alpha: f64, q: f64, elevator: f64) -> (f64, f64) {
+        self.along_and_across(size, alpha, alpha.sin_cos(), q, elevator)
+    }
+
+    /// The same with sine and cosine of α beside it.
+    #[inline(always)]
+    fn along_and_across(&self, size: &Size, alpha: f64, (sin, cos): (f64, f64), q: f64, elevator: f64) -> (f64, f64) {
         let linear = self.lift.zero + self.lift.alpha * alpha;
         let steady = match &self.stall {
             None => linear,
             Some(stall) => {
                 let part = stall.blend(alpha);
-                let (sin, cos) = alpha.sin_cos();
-                (1.0 - part) * linear + part * 2.0 * alpha.signum() * sin * sin * cos
+                // sign(α) sin²α = |sin α| sin α
+                (1.0 - part) * linear + part * 2.0 * sin.abs() * sin * cos
             }
         };
         let lift = steady + self.lift.pitch_rate * q + self.lift.elevator * elevator;
         let of_lift = match self.drag {
-            Drag::Oswald(e) => linear * linear / (PI * e * size.span * size.span / size.area),
+            Drag::Oswald(e) => linear * linear * size.area / (PI * e * size.span * size.span),
             Drag::Polar { factor, least } => factor * (lift - least) * (lift - least),
         };
         (lift, self.parasitic + of_lift + self.drag_pitch_rate * q + self.drag_elevator * elevator)
     }
 
-    /// Of the air alone.
-    pub(super) fn forces(&self, size: &Size, air: &AirState, controls: &Controls, density: f64) -> Wrench {
+    /// Of the air alone; `speed` is the length of the velocity.
+    #[inline(always)]
+    pub(super) fn forces(&self, size: &Size, air: &AirState, speed: f64, controls: &Controls, density: f64) -> Wrench {
         let [u, v, w] = air.velocity;
-        let speed = (u * u + v * v + w * w).sqrt();
         if speed == 0.0 {
             return Wrench::default();
         }
-        let (alpha, beta) = (w.atan2(u), (v / speed).asin());
-        let along = u.hypot(w);
-        let (sin, cos) = if along > 0.0 { (w / along, u / along) } else { (0.0, 1.0) };
-        let half = 0.5 / speed;
+        let per_speed = 1.0 / speed;
+        let along = (u * u + w * w).sqrt();
+        // asin(v/V) by both sides of its triangle, which rounding cannot leave
+        let (alpha, beta) = (direction(w, u), direction(v, along));
+        let per_along = 1.0 / along;
+        let (sin, cos) = if along > 0.0 { (w * per_along, u * per_along) } else { (0.0, 1.0) };
+        let half = 0.5 * per_speed;
         let [p, q, r] = [size.span, size.chord, size.span].map(|length| length * half);
         let (p, q, r) = (p * air.rate[0], q * air.rate[1], r * air.rate[2]);
-        let (lift, drag) = self.lift_and_drag(size, alpha, q, controls.elevator);
+        let (lift, drag) = self.along_and_across(size, alpha, (sin, cos), q, controls.elevator);
         let pitch = self.pitch.zero
             + self.pitch.alpha * alpha
             + self.pitch.pitch_rate * q
@@ -134,5 +161,24 @@ impl Aerodynamics {
             force: [pressure * (lift * sin - drag * cos), pressure * side, pressure * (-lift * cos - drag * sin)],
             moment: [pressure * size.span * roll, pressure * size.chord * pitch, pressure * size.span * yaw],
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::direction;
+
+    /// To two units in the last place, on both sides of where the series ends, and where there is no direction.
+    #[test]
+    fn a_direction_is_that_of_the_library() {
+        for i in -4000..=4000 {
+            for x in [25.0, 1e-3, -2.0] {
+                let y = f64::from(i) * 1e-4 * x;
+                let (found, expected) = (direction(y, x), y.atan2(x));
+                assert!((found - expected).abs() <= 4.5e-16 * expected.abs(), "{y} {x}: {found} {expected}");
+            }
+        }
+        assert_eq!([direction(0.0, 0.0), direction(1.0, 0.0)], [0.0, std::f64::consts::FRAC_PI_2]);
+        assert!(direction(f64::NAN, 1.0).is_nan() && direction(1.0, f64::NAN).is_nan());
     }
 }

@@ -12,7 +12,8 @@ use crate::numerics::optimize::{bisect, half_way};
 
 pub const FORMAT: &str = "kfdesign-airplane-check/1";
 
-/// Speeds looked at, as shares of the speed at which the wing carries the weight at a lift coefficient of one: far below any stall, far above any engine.
+/// Speeds looked at, as shares of the speed at which the wing carries the weight at a lift coefficient of one: far
+/// below any stall, far above any engine.
 const SPEEDS: [f64; 2] = [0.4, 10.0];
 const STEPS: usize = 120;
 /// Points of the curves.
@@ -124,10 +125,6 @@ impl Airplane {
             (0..=POINTS).map(move |i| range.slowest + step * i as f64)
         });
         let curve: Vec<SpeedPoint> = curve.filter_map(|v| Some(point(v, level(v).ok()?))).collect();
-        let i = self.inertia;
-        let (mean, half) = (0.5 * (i.xx + i.zz), (0.5 * (i.xx - i.zz)).hypot(i.xz));
-        let mut principal_moments = [mean - half, i.yy, mean + half];
-        principal_moments.sort_by(f64::total_cmp);
         let a = &self.aerodynamics;
         Ok(AirplaneCheck {
             format: FORMAT,
@@ -136,7 +133,7 @@ impl Airplane {
             mass: self.mass,
             wing_loading: self.mass / size.area,
             aspect_ratio: size.span * size.span / size.area,
-            principal_moments,
+            principal_moments: self.inertia.principal_moments(),
             static_margin: -a.pitch.alpha / a.lift.alpha,
             control_power: [a.pitch.elevator, a.roll.aileron, a.yaw.rudder],
             stall,
@@ -208,6 +205,15 @@ impl Airplane {
                 let usual = if positive { "above" } else { "below" };
                 out.push(format!("aerodynamics.{name} {value} is usually {usual} zero: {meaning}"));
             }
+        }
+        let [least, middle, greatest] = self.inertia.principal_moments();
+        let excess = greatest / (least + middle) - 1.0;
+        if excess > 0.0 {
+            out.push(format!(
+                "inertia: the largest principal moment is {:.1} % above the sum of the others, which no body has; \
+                 measured less well than that, or xz is wrong",
+                100.0 * excess
+            ));
         }
         for (name, moment, length) in [("xx", self.inertia.xx, self.size.span), ("zz", self.inertia.zz, self.size.span)]
         {

@@ -1,8 +1,9 @@
 //! Handling-quality levels of MIL-F-8785C, class I, as flown and for an airplane of another size by Froude's law.
 //!
-//! The limits are those of piloted airplanes. Rows of the lateral modes and of roll performance agree with a second transcription, those of short period, CAP
-//! and phugoid with textbooks (Cook, Flight Dynamics Principles; Stevens and Lewis); the document itself was not read line by line. At a scale
-//! N = full size/model times go with √N, frequencies with 1/√N and CAP with 1/N (Foster and Bowman, AIAA 2005-1023).
+//! The limits are those of piloted airplanes. Rows of the lateral modes and of roll performance agree with a second
+//! transcription, those of short period, CAP and phugoid with textbooks (Cook, Flight Dynamics Principles; Stevens and
+//! Lewis); the document itself was not read line by line. At a scale N = full size/model times go with √N, frequencies
+//! with 1/√N and CAP with 1/N (Foster and Bowman, AIAA 2005-1023).
 
 use nalgebra::DVector;
 
@@ -13,7 +14,8 @@ use super::trim::Trim;
 use crate::aircraft::atmosphere::standard::GRAVITY;
 
 /// Printed beside every level.
-pub const CAUTION: &str = "limits of MIL-F-8785C for piloted airplanes of class I, from transcriptions; a guide, no requirement, for one without a pilot aboard";
+pub const CAUTION: &str = "limits of MIL-F-8785C for piloted airplanes of class I (small and light; II to IV are not \
+    held), flight phases A, B, C, from transcriptions; a guide, no requirement, for one without a pilot aboard";
 
 /// Flight phases: A rapid manoeuvring, B climb, cruise and descent, C take-off and landing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -211,8 +213,8 @@ pub fn criteria(
 /// Longest time looked at, s.
 const LONGEST: f64 = 10.0;
 
-/// Time until the lateral model has banked by an angle (rad) when the aileron runs from its trim to the nearer stop, at its rate limit: s. Absent without
-/// a stop, or when 10 s are not enough.
+/// Time until the lateral model has banked by an angle (rad) when the aileron runs from its trim to the nearer stop, at
+/// its rate limit: s. Absent without a stop, or when 10 s are not enough.
 fn time_to_bank(airplane: &Airplane, trim: &Trim, models: &LinearModels, angle: f64) -> Option<f64> {
     let servo = airplane.actuators[1]?;
     let [low, high] = servo.travel.map(|stop| (stop - trim.controls.aileron).abs());

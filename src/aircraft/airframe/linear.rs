@@ -1,8 +1,9 @@
 //! Small motions about a steady flight: ẋ = A x + B u + E g.
 //!
-//! With V the velocity and ω the rate in body axes, V̇ = F/m + g_b − ω×V, J ω̇ = M − ω×(Jω), φ̇ = p + tan θ (q sin φ + r cos φ), θ̇ = q cos φ − r sin φ
-//! (Stevens, Lewis and Johnson 2016, section 1.7); F and M belong to the motion relative to the air, so that a gust enters as its negative there and nowhere
-//! else: E holds the negative columns of A without gravity and without the ω×V part. The density stays that of the trim.
+//! With V the velocity and ω the rate in body axes, V̇ = F/m + g_b − ω×V, J ω̇ = M − ω×(Jω), φ̇ = p + tan θ (q sin φ +
+//! r cos φ), θ̇ = q cos φ − r sin φ (Stevens, Lewis and Johnson 2016, section 1.7); F and M belong to the motion
+//! relative to the air, so that a gust enters as its negative there and nowhere else: E holds the negative columns of A
+//! without gravity and without the ω×V part. The density stays that of the trim.
 
 use nalgebra::DMatrix;
 
@@ -71,13 +72,14 @@ impl Trim {
 
 impl Inertia {
     /// ω̇ of J ω̇ = M − ω×(Jω) with J = [xx 0 −xz; 0 yy 0; −xz 0 zz].
+    #[inline(always)]
     pub fn acceleration(&self, moment: [f64; 3], [p, q, r]: [f64; 3]) -> [f64; 3] {
         let [hx, hy, hz] = [self.xx * p - self.xz * r, self.yy * q, self.zz * r - self.xz * p];
         let l = moment[0] - (q * hz - r * hy);
         let m = moment[1] - (r * hx - p * hz);
         let n = moment[2] - (p * hy - q * hx);
-        let determinant = self.xx * self.zz - self.xz * self.xz;
-        [(self.zz * l + self.xz * n) / determinant, m / self.yy, (self.xz * l + self.xx * n) / determinant]
+        let per_determinant = 1.0 / (self.xx * self.zz - self.xz * self.xz);
+        [(self.zz * l + self.xz * n) * per_determinant, m / self.yy, (self.xz * l + self.xx * n) * per_determinant]
     }
 }
 
@@ -113,8 +115,9 @@ impl Airplane {
         ]
     }
 
-    /// A, B and E at a trim by central differences with three steps, extrapolated to step zero twice (Richardson): the error is of order six in the step,
-    /// below 1e-9 of the largest entry of a row for derivatives that change over more than a tenth of the angles.
+    /// A, B and E at a trim by central differences with three steps, extrapolated to step zero twice (Richardson): the
+    /// error is of order six in the step, below 1e-9 of the largest entry of a row for derivatives that change over
+    /// more than a tenth of the angles.
     pub fn linear(&self, trim: &Trim) -> LinearModels {
         let ([u, v, w], [p, q, r]) = (trim.velocity, trim.rate);
         let c = trim.controls;

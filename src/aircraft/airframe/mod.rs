@@ -1,7 +1,7 @@
 //! The `airplane.json` document, aerodynamics, propulsion and trim (floor 2).
 //!
-//! [`Airplane`] is an airplane in SI; what it feels in moving air is [`Airplane::forces`], a pure function of the state of the air, the controls and the
-//! density.
+//! [`Airplane`] is an airplane in SI; what it feels in moving air is [`Airplane::forces`], a pure function of the state
+//! of the air, the controls and the density.
 
 mod aerodynamics;
 pub mod check;
@@ -10,11 +10,12 @@ pub mod levels;
 pub mod linear;
 pub mod modes;
 mod propulsion;
+mod schema;
 pub mod trim;
 
 pub use aerodynamics::{Aerodynamics, Drag, Lateral, Lift, Pitch, Stall};
-pub use document::AirplaneDocument;
 pub use propulsion::{Curve, Motor, Propulsion, Running};
+pub use schema::AirplaneDocument;
 
 /// Velocity (m/s) and rate (rad/s) against the air, body axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -23,7 +24,8 @@ pub struct AirState {
     pub rate: [f64; 3],
 }
 
-/// Where surfaces (rad) and throttle stand. An airplane whose propulsion is a thrust has it, in N, in place of the throttle.
+/// Where surfaces (rad) and throttle stand. An airplane whose propulsion is a thrust has it, in N, in place of the
+/// throttle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Controls {
     pub elevator: f64,
@@ -39,13 +41,24 @@ pub struct Wrench {
     pub moment: [f64; 3],
 }
 
-/// Moments of inertia about the centre of gravity, kg m². `xz` is the integral ∫xz dm, so that the matrix is [xx 0 −xz; 0 yy 0; −xz 0 zz].
+/// Moments of inertia about the centre of gravity, kg m². `xz` is the integral ∫xz dm, so that the matrix is [xx 0 −xz;
+/// 0 yy 0; −xz 0 zz].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Inertia {
     pub xx: f64,
     pub yy: f64,
     pub zz: f64,
     pub xz: f64,
+}
+
+impl Inertia {
+    /// Ascending; the y axis is one of theirs.
+    pub fn principal_moments(&self) -> [f64; 3] {
+        let (mean, half) = (0.5 * (self.xx + self.zz), (0.5 * (self.xx - self.zz)).hypot(self.xz));
+        let mut moments = [mean - half, self.yy, mean + half];
+        moments.sort_by(f64::total_cmp);
+        moments
+    }
 }
 
 /// Wing area (m²), span and mean chord (m).
@@ -87,12 +100,14 @@ pub struct Airplane {
 
 impl Airplane {
     /// What it feels in air of a density (kg/m³).
+    #[inline(always)]
     pub fn forces(&self, air: &AirState, controls: &Controls, density: f64) -> Wrench {
-        let mut wrench = self.aerodynamics.forces(&self.size, air, controls, density);
         let [u, v, w] = air.velocity;
-        let running = self.propulsion.running(controls.throttle, (u * u + v * v + w * w).sqrt(), density);
-        wrench.force[0] += running.thrust;
-        wrench.moment[0] -= running.reaction;
+        let speed = (u * u + v * v + w * w).sqrt();
+        let mut wrench = self.aerodynamics.forces(&self.size, air, speed, controls, density);
+        let (thrust, reaction) = self.propulsion.thrust_and_reaction(controls.throttle, speed, density);
+        wrench.force[0] += thrust;
+        wrench.moment[0] -= reaction;
         wrench
     }
 

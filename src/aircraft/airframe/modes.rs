@@ -65,7 +65,8 @@ impl Mode {
     }
 }
 
-/// The left null vector v of A − λI, vᴴ(A − λI) = 0, of unit length, real parts then imaginary ones, by the smallest singular value of the real form.
+/// The left null vector v of A − λI, vᴴ(A − λI) = 0, of unit length, real parts then imaginary ones, by the smallest
+/// singular value of the real form.
 ///
 /// Errors: numbers that are not finite.
 pub fn left_eigenvector(a: &DMatrix<f64>, (re, im): (f64, f64)) -> Result<Vec<f64>, LinalgError> {
@@ -92,9 +93,10 @@ pub fn real_form(m: &DMatrix<f64>, im: f64) -> DMatrix<f64> {
     out
 }
 
-/// Modes of a model, fastest first. A mode is longitudinal when most of its eigenvector is (velocities over the speed); of the longitudinal pairs the
-/// faster is the short period and the slower the phugoid, the lateral pair is the Dutch roll, the faster of two real lateral modes the roll and the slower
-/// the spiral. Motions of another kind are an oscillation or real.
+/// Modes of a model, fastest first. A mode is longitudinal when most of its eigenvector is (velocities over the speed);
+/// of the longitudinal pairs the faster is the short period and the slower the phugoid, the lateral pair is the Dutch
+/// roll, the faster of two real lateral modes the roll and the slower the spiral. Motions of another kind are an
+/// oscillation or real.
 pub fn modes(model: &LinearModel, speed: f64) -> Result<Vec<Mode>, LinalgError> {
     let a = &model.in_angles(speed).a;
     let longitudinal: Vec<bool> = model.states.iter().map(|s| ["u", "w", "q", "theta"].contains(&s.0)).collect();

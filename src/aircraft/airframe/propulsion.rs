@@ -1,7 +1,8 @@
 //! A propeller on an electric motor in its steady state, or a thrust as it is told.
 //!
-//! With V_in = Vmax δt, n turns per second, J = V/(nD): thrust ρn²D⁴CT(J), torque ρn²D⁵CQ(J), and the motor gives KV((V_in − KV Ω)/R − i0) (McLain's supplement
-//! to Beard and McLain 2012). Inertia and gyroscopic moment of the rotor are left out.
+//! With V_in = Vmax δt, n turns per second, J = V/(nD): thrust ρn²D⁴CT(J), torque ρn²D⁵CQ(J), and the motor gives
+//! KV((V_in − KV Ω)/R − i0) (McLain's supplement to Beard and McLain 2012). Inertia and gyroscopic moment of the rotor
+//! are left out.
 
 use std::f64::consts::TAU;
 
@@ -56,36 +57,39 @@ pub struct Running {
 }
 
 impl Curve {
-    pub fn at(&self, j: f64) -> f64 {
+    /// w² C(v/w), the coefficient with its powers of the propeller's own speed w = nD (m/s): no division where it is a
+    /// polynomial, and no break where the propeller stands still.
+    #[inline(always)]
+    fn of_speeds(&self, w: f64, v: f64) -> f64 {
         match self {
-            Curve::Quadratic([a, b, c]) => a + j * (b + j * c),
+            Curve::Quadratic([a, b, c]) => a * w * w + v * (b * w + v * c),
             Curve::Table(points) => {
+                let j = if w > 0.0 { v / w } else { f64::INFINITY };
                 let above = points.partition_point(|p| p[0] <= j).clamp(1, points.len() - 1);
                 let ([x0, y0], [x1, y1]) = (points[above - 1], points[above]);
-                y0 + (y1 - y0) * ((j - x0) / (x1 - x0)).clamp(0.0, 1.0)
+                w * w * (y0 + (y1 - y0) * ((j - x0) / (x1 - x0)).clamp(0.0, 1.0))
             }
         }
     }
 }
 
 impl Motor {
-    /// Ω at a voltage, an airspeed and a density: where propeller and motor have the same torque.
-    fn rate(&self, volts: f64, speed: f64, density: f64) -> f64 {
+    /// w = nD at a voltage, an airspeed and a density: where propeller and motor have the same torque, ρD³ w²CQ(v/w) =
+    /// KV((V_in − KV Ω)/R − i0), Ω = 2πw/D.
+    #[inline(always)]
+    fn speed(&self, volts: f64, v: f64, density: f64) -> f64 {
         let Motor { diameter: d, constant: k, resistance, .. } = self;
+        let scale = density * d * d * d;
+        // the motor's torque: that at rest, and what is lost per w
+        let per_resistance = k / resistance;
+        let (rest, loss) = (per_resistance * volts - k * self.no_load_current, per_resistance * k * TAU / d);
         if let Curve::Quadratic([c0, c1, c2]) = self.torque {
-            let a = c0 * density * d.powi(5) / (TAU * TAU);
-            let b = c1 * density * d.powi(4) * speed / TAU + k * k / resistance;
-            let c = c2 * density * d.powi(3) * speed * speed - k * volts / resistance + k * self.no_load_current;
+            let (a, b, c) = (scale * c0, scale * c1 * v + loss, scale * c2 * v * v - rest);
             // a motor that the air does not let turn stands still
-            return ((-b + (b * b - 4.0 * a * c).max(0.0).sqrt()) / (2.0 * a)).max(0.0);
+            return (((b * b - 4.0 * a * c).max(0.0).sqrt() - b) / (2.0 * a)).max(0.0);
         }
-        let lack = |rate: f64| {
-            let n = rate / TAU;
-            let j = if n > 0.0 { speed / (n * d) } else { f64::INFINITY };
-            density * n * n * d.powi(5) * self.torque.at(j)
-                - k * ((volts - k * rate) / resistance - self.no_load_current)
-        };
-        let high = (volts / k).max(0.0);
+        let lack = |w: f64| scale * self.torque.of_speeds(w, v) + loss * w - rest;
+        let high = (volts / k * d / TAU).max(0.0);
         if lack(high) < 0.0 {
             return high;
         }
@@ -93,26 +97,38 @@ impl Motor {
         // nothing
         bracketed_root(lack, 0.0, high, 0.0).unwrap_or(0.0)
     }
+
+    /// Thrust and reaction at a speed w = nD of the propeller.
+    #[inline(always)]
+    fn wrench(&self, w: f64, v: f64, density: f64) -> (f64, f64) {
+        let scale = density * self.diameter * self.diameter;
+        let torque = self.turns * scale * self.diameter * self.torque.of_speeds(w, v);
+        (scale * self.thrust.of_speeds(w, v), torque)
+    }
 }
 
 impl Propulsion {
+    /// Thrust (N) along x and the moment (N m) about it that the airplane feels less.
+    #[inline(always)]
+    pub(super) fn thrust_and_reaction(&self, throttle: f64, speed: f64, density: f64) -> (f64, f64) {
+        match self {
+            Propulsion::Thrust { .. } => (throttle, 0.0),
+            Propulsion::Motor(motor) => {
+                motor.wrench(motor.speed(motor.voltage * throttle, speed, density), speed, density)
+            }
+        }
+    }
+
     /// At a throttle (0 to 1, or the thrust in N), an airspeed (m/s) and a density (kg/m³).
     pub fn running(&self, throttle: f64, speed: f64, density: f64) -> Running {
         match self {
             Propulsion::Thrust { .. } => Running { thrust: throttle, ..Running::default() },
             Propulsion::Motor(motor) => {
                 let volts = motor.voltage * throttle;
-                let rate = motor.rate(volts, speed, density);
-                let n = rate / TAU;
-                let d = motor.diameter;
-                let j = if n > 0.0 { speed / (n * d) } else { 0.0 };
-                let scale = density * n * n * d.powi(4);
-                Running {
-                    thrust: scale * motor.thrust.at(j),
-                    reaction: motor.turns * scale * d * motor.torque.at(j),
-                    rate,
-                    current: (volts - motor.constant * rate) / motor.resistance,
-                }
+                let w = motor.speed(volts, speed, density);
+                let (thrust, reaction) = motor.wrench(w, speed, density);
+                let rate = TAU * w / motor.diameter;
+                Running { thrust, reaction, rate, current: (volts - motor.constant * rate) / motor.resistance }
             }
         }
     }

@@ -72,7 +72,8 @@ pub struct Trim {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{message}")]
 pub struct TrimError {
-    /// "lift", "elevator", "aileron", "rudder", "thrust", "brake"; "solution" when Newton's method finds none, "request" when it asks for what is nothing.
+    /// "lift", "elevator", "aileron", "rudder", "thrust", "brake"; "solution" when Newton's method finds none,
+    /// "request" when it asks for what is nothing.
     pub missing: &'static str,
     pub message: String,
 }
@@ -85,7 +86,8 @@ impl TrimError {
 
 type Unknowns = SVector<f64, 8>;
 
-/// What remains, m/s² or rad/s², where the controls are those of the flight asked for, to as many digits as a message shows.
+/// What remains, m/s² or rad/s², where the controls are those of the flight asked for, to as many digits as a message
+/// shows.
 const SOLVED: f64 = 1e-6;
 
 impl Airplane {
@@ -111,7 +113,8 @@ impl Airplane {
         let pressure = 0.5 * air.density * speed * speed * self.size.area;
         let needed = self.mass * g * request.climb.cos() / (pressure * bank.cos());
         let lift = &self.aerodynamics.lift;
-        // the wing alone does not carry the airplane: said where thrust cannot make up for it, or no steady flight is found
+        // the wing alone does not carry the airplane: said where thrust cannot make up for it, or no steady flight is
+        // found
         let mut too_slow = None;
         if let Some(stall) = self.aerodynamics.stall {
             let most = (0..200)
@@ -126,7 +129,8 @@ impl Airplane {
             let error = TrimError::new(
                 "lift",
                 format!(
-                    "no lift: {speed} m/s{turn} needs a lift coefficient of {needed:.2}, the wing stalls at {most:.2}; fly faster or turn less"
+                    "no lift: {speed} m/s{turn} needs a lift coefficient of {needed:.2}, the wing stalls at {most:.2}; \
+                     fly faster or turn less"
                 ),
             );
             if needed > most + (thrust * (stall.angle + request.climb).sin() / pressure).max(0.0) {
@@ -135,13 +139,37 @@ impl Airplane {
             too_slow = (needed > most).then_some(error);
         }
         let alpha = (needed - lift.zero) / lift.alpha;
-        let throttle = 0.5 * self.propulsion.greatest().min(2.0 * self.mass * g);
         let turn = match request.turn {
             Turn::Rate(_) => bank,
             Turn::Bank(_) => turn_rate,
         };
-        let mut x = Unknowns::from([alpha, 0.0, turn, alpha + request.climb, 0.0, 0.0, 0.0, throttle]);
-        let residual = |x: &Unknowns| self.lacks(x, request, air.density);
+        let most = self.propulsion.greatest().min(2.0 * self.mass * g);
+        // half the throttle may lie where a propeller is turned by the air and gives the same thrust at any: then once
+        // more from full
+        let mut found = (Unknowns::zeros(), f64::INFINITY);
+        for share in [0.5, 1.0] {
+            let start = [alpha, 0.0, turn, alpha + request.climb, 0.0, 0.0, 0.0, share * most];
+            let (x, r) = self.newton(start.into(), request, air.density);
+            if r < found.1 {
+                found = (x, r);
+            }
+            if r < SOLVED {
+                break;
+            }
+        }
+        let (x, r) = found;
+        match too_slow {
+            Some(error) if r >= SOLVED => Err(error),
+            _ => {
+                let drag = pressure * self.aerodynamics.lift_and_drag(&self.size, alpha, 0.0, 0.0).1;
+                self.judge(&x, r, drag + self.mass * g * request.climb.sin(), request, air.density)
+            }
+        }
+    }
+
+    /// From a start to where no step of Newton's method makes it better, and what remains there.
+    fn newton(&self, mut x: Unknowns, request: &TrimRequest, density: f64) -> (Unknowns, f64) {
+        let residual = |x: &Unknowns| self.lacks(x, request, density);
         let mut r = residual(&x);
         for _ in 0..100 {
             let mut jacobian = SMatrix::<f64, 8, 8>::zeros();
@@ -168,10 +196,7 @@ impl Airplane {
             }
             (x, r) = (next, after);
         }
-        match too_slow {
-            Some(error) if r.amax() >= SOLVED => Err(error),
-            _ => self.judge(&x, r.amax(), request, air.density),
-        }
+        (x, r.amax())
     }
 
     /// u̇ v̇ ẇ ṗ q̇ ṙ, climb and the sideways condition at a set of unknowns.
@@ -200,7 +225,8 @@ impl Airplane {
         ])
     }
 
-    /// The unknowns are α, β, the bank (or the turn rate, when the bank is given), θ, elevator, aileron, rudder, throttle.
+    /// The unknowns are α, β, the bank (or the turn rate, when the bank is given), θ, elevator, aileron, rudder,
+    /// throttle.
     fn state(&self, x: &Unknowns, request: &TrimRequest, density: f64) -> Trim {
         let [alpha, beta, turn, theta, elevator, aileron, rudder, throttle] = (*x).into();
         let (phi, turn_rate) = match request.turn {
@@ -224,11 +250,31 @@ impl Airplane {
         }
     }
 
-    /// The solution, if the controls reach it.
-    fn judge(&self, x: &Unknowns, residual: f64, request: &TrimRequest, density: f64) -> Result<Trim, TrimError> {
+    /// The solution, if the controls reach it. `wanted`: the thrust of a point mass, N, which says what is missing where
+    /// there is no solution.
+    fn judge(
+        &self,
+        x: &Unknowns,
+        residual: f64,
+        wanted: f64,
+        request: &TrimRequest,
+        density: f64,
+    ) -> Result<Trim, TrimError> {
         let speed = request.airspeed;
         let trim = Trim { residual, ..self.state(x, request, density) };
         let c = trim.controls;
+        // beyond the stall the other controls say nothing: lift is what is missing
+        if let Some(stall) = self.aerodynamics.stall.filter(|stall| trim.alpha >= stall.angle) {
+            return Err(TrimError::new(
+                "lift",
+                format!(
+                    "no lift: steady flight at {speed} m/s needs an angle of attack of {:.1} deg, the stall is \
+                     at {:.1} deg",
+                    trim.alpha.to_degrees(),
+                    stall.angle.to_degrees()
+                ),
+            ));
+        }
         for (name, at, actuator) in [("elevator", c.elevator, 0), ("aileron", c.aileron, 1), ("rudder", c.rudder, 2)]
             .map(|(n, c, i)| (n, c, self.actuators[i]))
         {
@@ -237,7 +283,8 @@ impl Airplane {
                 return Err(TrimError::new(
                     name,
                     format!(
-                        "no {name}: steady flight at {speed} m/s needs {:.1} deg, the stops are {:.1} deg and {:.1} deg",
+                        "no {name}: steady flight at {speed} m/s needs {:.1} deg, the stops are {:.1} deg \
+                         and {:.1} deg",
                         at.to_degrees(),
                         least.to_degrees(),
                         greatest.to_degrees()
@@ -245,19 +292,18 @@ impl Airplane {
                 ));
             }
         }
-        // beyond the stall the other controls say nothing: lift is what is missing
-        if let Some(stall) = self.aerodynamics.stall.filter(|stall| trim.alpha >= stall.angle) {
+        let most = self.propulsion.greatest();
+        let solved = residual < SOLVED;
+        let thrust = |throttle: f64| self.propulsion.running(throttle, speed, density).thrust;
+        if !solved && most.is_finite() && wanted > thrust(most) {
             return Err(TrimError::new(
-                "lift",
+                "thrust",
                 format!(
-                    "no lift: steady flight at {speed} m/s needs an angle of attack of {:.1} deg, the stall is at {:.1} deg",
-                    trim.alpha.to_degrees(),
-                    stall.angle.to_degrees()
+                    "no thrust: steady flight at {speed} m/s needs {wanted:.1} N, there are {:.1} N at full throttle",
+                    thrust(most)
                 ),
             ));
         }
-        let most = self.propulsion.greatest();
-        let solved = residual < SOLVED;
         if c.throttle > most || (!solved && c.throttle > 0.9 * most) {
             return Err(TrimError::new(
                 "thrust",
@@ -270,7 +316,7 @@ impl Airplane {
                 ),
             ));
         }
-        if solved && c.throttle < 0.0 {
+        if (solved && c.throttle < 0.0) || (!solved && wanted < thrust(0.0)) {
             return Err(TrimError::new(
                 "brake",
                 format!(

@@ -3,16 +3,20 @@
 //! One-sided spectra in ω (rad/s), σ² = ∫₀^∞ Φ dω, with T = L/V:
 //!
 //! Φu = σu² (2 Tu/π)/(1 + (Tu ω)²),  Φv,w = σ² (T/π)(1 + 3(Tω)²)/(1 + (Tω)²)²,
-//! Φp = σw² 0.8 (πLw/4b)^(1/3)/(V Lw (1 + (4bω/πV)²)),  Φq = (ω/V)²/(1 + (4bω/πV)²) Φw,  Φr = (ω/V)²/(1 + (3bω/πV)²) Φv.
+//! Φp = σw² 0.8 (πLw/4b)^(1/3)/(V Lw (1 + (4bω/πV)²)),  Φq = (ω/V)²/(1 + (4bω/πV)²) Φw,  Φr = (ω/V)²/(1 + (3bω/πV)²)
+//! Φv.
 //!
-//! The filters are driven by white noise n of unit two-sided density, E[n(t)n(t')] = δ(t − t'), so that |H|² = πΦ. Signs of the rates are those of air
-//! that turns like a rigid body, p = ∂w/∂y, q = −∂w/∂x, r = +∂v/∂x: the airplane feels its own rate less these.
+//! The filters are driven by white noise n of unit two-sided density, E[n(t)n(t')] = δ(t − t'), so that |H|² = πΦ.
+//! Signs of the rates are those of air that turns like a rigid body, p = ∂w/∂y, q = −∂w/∂x, r = +∂v/∂x: the airplane
+//! feels its own rate less these.
 //!
-//! MIL-F-8785C (1980), section 3.7, has lengths Lu = Lv, Lw; MIL-HDBK-1797 (1997) has half of these for v and w, and 2L in the filters of v, w and p. The
-//! spectra are the same; lengths of one document in the filters of the other are wrong by two.
+//! MIL-F-8785C (1980), section 3.7, has lengths Lu = Lv, Lw; MIL-HDBK-1797 (1997) has half of these for v and w, and 2L
+//! in the filters of v, w and p. The spectra are the same; lengths of one document in the filters of the other are
+//! wrong by two.
 //!
-//! Not valid: within a wing span or so of the ground, where the spectra were not measured; for a span that is not small beside L (the filters of p, q, r
-//! assume it); for flight so slow that the air changes while the airplane crosses it (frozen field).
+//! Not valid: within a wing span or so of the ground, where the spectra were not measured; for a span that is not small
+//! beside L (the filters of p, q, r assume it); for flight so slow that the air changes while the airplane crosses it
+//! (frozen field).
 
 use std::f64::consts::PI;
 
@@ -24,7 +28,8 @@ use crate::numerics::riccati::lyapunov;
 use crate::numerics::van_loan::van_loan;
 
 pub const FOOT: f64 = 0.3048;
-/// The low-altitude model holds between these heights, ft; between the second and the third lengths and intensities are interpolated.
+/// The low-altitude model holds between these heights, ft; between the second and the third lengths and intensities are
+/// interpolated.
 const LOW: [f64; 3] = [10.0, 1000.0, 2000.0];
 /// Scale length above, ft.
 const LENGTH_ALOFT: f64 = 1750.0;
@@ -91,8 +96,8 @@ pub struct GustModel {
 }
 
 impl Dryden {
-    /// Scale lengths and intensities at a height above ground (m), an airspeed (m/s) and for a span (m). Errors: below 10 ft, or the intensity that this
-    /// height needs is not given.
+    /// Scale lengths and intensities at a height above ground (m), an airspeed (m/s) and for a span (m). Errors: below
+    /// 10 ft, or the intensity that this height needs is not given.
     pub fn new(
         specification: Specification,
         height: f64,
@@ -103,7 +108,8 @@ impl Dryden {
         let feet = height / FOOT;
         if feet.is_nan() || feet < LOW[0] {
             return Err(AirError(format!(
-                "height {height} m: Dryden turbulence is defined from 10 ft (3.048 m) above the ground; fly higher or leave the gusts out"
+                "height {height} m: Dryden turbulence is defined from 10 ft (3.048 m) above the ground; fly higher or \
+                 leave the gusts out"
             )));
         }
         if !(airspeed > 0.0 && span > 0.0) {
@@ -119,7 +125,7 @@ impl Dryden {
             Ok([feet / k.powf(1.2), feet, vertical / k.powf(0.4), vertical])
         };
         let aloft = || -> Result<[f64; 4], AirError> {
-            let name = "std_dev, of u, v and w from the specification's chart, for example \"1.5 m/s\"";
+            let name = "std_dev, for example \"1.5 m/s\", or exceedance, for example 1e-2 for light turbulence";
             let std_dev = needs(name, intensity.std_dev_aloft)?;
             Ok([LENGTH_ALOFT, LENGTH_ALOFT, std_dev, std_dev])
         };
@@ -206,6 +212,8 @@ impl Dryden {
 
 /// The independent parts of the state: first state and length.
 pub const PARTS: [(usize, usize); 4] = [(0, 1), (1, 3), (4, 3), (7, 1)];
+/// Which gusts of u v w p q r each part makes.
+pub(super) const OUTPUTS: [&[usize]; 4] = [&[0], &[2, 4], &[1, 5], &[3]];
 
 /// x⁺ = F x + v, v ~ N(0, Q), exact over a step.
 #[derive(Clone, Debug, PartialEq)]
@@ -219,7 +227,8 @@ impl GustModel {
     pub fn over(&self, dt: f64) -> Result<DiscreteGusts, LinalgError> {
         let mut out = DiscreteGusts { f: SMatrix::zeros(), q: SMatrix::zeros() };
         for (at, n) in PARTS {
-            // integrals of the driven state in units of dt, so that all entries of Q have one size however short the step
+            // integrals of the driven state in units of dt, so that all entries of Q have one size however short the
+            // step
             let unit = |i: usize| if n == 3 && i != 1 { dt } else { 1.0 };
             let a = DMatrix::from_fn(n, n, |i, j| self.a[(at + i, at + j)] * unit(j) / unit(i));
             let b = DMatrix::from_fn(n, 4, |i, k| self.b[(at + i, k)] / unit(i));

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, SMatrix, SVector};
 use rand::rngs::ChaCha8Rng;
 
 use super::Gust;
-use super::dryden::{GustModel, PARTS, STATES};
+use super::dryden::{GustModel, OUTPUTS, PARTS, STATES};
 use crate::numerics::linalg::{LinalgError, cholesky_semidefinite};
 use crate::numerics::random::normal;
 
@@ -20,25 +20,27 @@ pub struct Turbulence {
 }
 
 impl Turbulence {
-    /// At the first step. `streams`: one for each of the white noises u, w, v, p. Errors: the model has no discrete form over `dt`.
-    pub fn new(model: &GustModel, dt: f64, streams: [ChaCha8Rng; 4]) -> Result<Turbulence, LinalgError> {
+    /// At the first step. `streams`: one for each of the white noises u, w, v, p. Errors: the model has no discrete
+    /// form over `dt`.
+    pub fn new(model: &GustModel, dt: f64, mut streams: [ChaCha8Rng; 4]) -> Result<Turbulence, LinalgError> {
         let step = model.over(dt)?;
-        let mut turbulence =
-            Turbulence { f: step.f, noise: factor(&step.q)?, c: model.c, x: SVector::zeros(), streams };
-        let stationary = factor(&model.state_covariance()?)?;
-        turbulence.x = turbulence.draw(&stationary);
-        Ok(turbulence)
+        let x = draw(&factor(&model.state_covariance()?)?, &mut streams);
+        Ok(Turbulence { f: step.f, noise: factor(&step.q)?, c: model.c, x, streams })
     }
 
     /// The gust at the present step.
     pub fn gust(&self) -> Gust {
-        let y = self.c * self.x;
+        let mut y = [0.0; 6];
+        for ((at, n), outputs) in PARTS.into_iter().zip(OUTPUTS) {
+            for output in outputs {
+                y[*output] = (at..at + n).map(|i| self.c[(*output, i)] * self.x[i]).sum();
+            }
+        }
         Gust { velocity: [y[0], y[1], y[2]], rate: [y[3], y[4], y[5]] }
     }
 
     pub fn step(&mut self) {
-        let noise = self.noise;
-        let v = self.draw(&noise);
+        let v = draw(&self.noise, &mut self.streams);
         for (at, n) in PARTS {
             let x: [f64; 3] = std::array::from_fn(|i| if i < n { self.x[at + i] } else { 0.0 });
             for i in 0..n {
@@ -46,20 +48,20 @@ impl Turbulence {
             }
         }
     }
+}
 
-    /// L n with n standard normal.
-    fn draw(&mut self, factor: &SMatrix<f64, STATES, STATES>) -> SVector<f64, STATES> {
-        let mut out = SVector::zeros();
-        for ((at, n), stream) in PARTS.into_iter().zip(&mut self.streams) {
-            for j in 0..n {
-                let draw = normal(stream);
-                for i in j..n {
-                    out[at + i] += factor[(at + i, at + j)] * draw;
-                }
+/// L n with n standard normal.
+fn draw(factor: &SMatrix<f64, STATES, STATES>, streams: &mut [ChaCha8Rng; 4]) -> SVector<f64, STATES> {
+    let mut out = SVector::zeros();
+    for ((at, n), stream) in PARTS.into_iter().zip(streams) {
+        for j in 0..n {
+            let draw = normal(stream);
+            for i in j..n {
+                out[at + i] += factor[(at + i, at + j)] * draw;
             }
         }
-        out
     }
+    out
 }
 
 /// Lower factor of a covariance, part by part.

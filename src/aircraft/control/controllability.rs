@@ -1,8 +1,9 @@
 //! How well modes are reached by controls and seen by sensors.
 //!
-//! Everything here depends on units: it is that of the model as given, in SI, or with velocities divided by the airspeed (`LinearModel::in_angles`).
-//! PBH: the smallest singular value of [A − λI, B] (Popov, Belevitch, Hautus); modal measure |vᴴb|/(|v||b|), v the left eigenvector (Hamdan and Nayfeh 1989);
-//! Gramian W(T) = ∫₀ᵀ e^(At)BBᵀe^(Aᵀt) dt.
+//! Everything here depends on units: it is that of the model as given, in SI, or with velocities divided by the
+//! airspeed (`LinearModel::in_angles`). PBH: the smallest singular value of [A − λI, B] (Popov, Belevitch, Hautus);
+//! modal measure |vᴴb|/(|v||b|), v the left eigenvector (Hamdan and Nayfeh 1989); Gramian W(T) = ∫₀ᵀ e^(At)BBᵀe^(Aᵀt)
+//! dt.
 
 use nalgebra::DMatrix;
 

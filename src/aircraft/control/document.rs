@@ -173,8 +173,8 @@ pub struct CriterionDocument {
     pub note: Option<String>,
 }
 
-/// How a mode is reached or seen. It depends on units: SI and rad here, and once more with velocities divided by the airspeed, so that every state is an
-/// angle or a rate.
+/// How a mode is reached or seen. It depends on units: SI and rad here, and once more with velocities divided by the
+/// airspeed, so that every state is an angle or a rate.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "Reach")]

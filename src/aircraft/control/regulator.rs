@@ -18,10 +18,11 @@ pub struct Regulator {
     pub relative_residual: f64,
 }
 
-/// Of ẋ = A x + B u. A n×n, B n×m, Q n×n semidefinite, R m×m definite; (A, B) stabilisable and no undetected mode on the imaginary axis.
+/// Of ẋ = A x + B u. A n×n, B n×m, Q n×n semidefinite, R m×m definite; (A, B) stabilisable and no undetected mode on
+/// the imaginary axis.
 ///
-/// By the sign of the Hamiltonian (Roberts 1980, Int. J. Control 32) with determinants for scale (Byers 1987), then one step of Newton's method.
-/// Errors: shapes, R not definite, or no stabilising solution.
+/// By the sign of the Hamiltonian (Roberts 1980, Int. J. Control 32) with determinants for scale (Byers 1987), then one
+/// step of Newton's method. Errors: shapes, R not definite, or no stabilising solution.
 pub fn regulator(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
@@ -79,7 +80,8 @@ pub fn regulator(
     Ok(Regulator { gain: &r_b * &x, relative_residual: residual.amax() / q.amax(), cost: x })
 }
 
-/// The cost of the gain of `x`: (A − BK)ᵀX + X(A − BK) + Q + KᵀRK = 0 (Kleinman 1968), as one linear system of n² numbers.
+/// The cost of the gain of `x`: (A − BK)ᵀX + X(A − BK) + Q + KᵀRK = 0 (Kleinman 1968), as one linear system of n²
+/// numbers.
 fn newton(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,

@@ -7,7 +7,8 @@ use crate::aircraft::atmosphere::dryden::Dryden;
 use crate::aircraft::atmosphere::turbulence::Turbulence;
 use crate::numerics::linalg::LinalgError;
 
-/// Between two steps the gust goes straight: its spectrum then differs from the exact one by (ω h)²/6 at most, where a held one lags by half a step too.
+/// Between two steps the gust goes straight: its spectrum then differs from the exact one by (ω h)²/6 at most, where a
+/// held one lags by half a step too.
 #[derive(Debug)]
 pub(super) struct MovingAir {
     turbulence: Vec<Turbulence>,
@@ -75,6 +76,7 @@ impl MovingAir {
     }
 
     /// At a part of the present step, 0 to 1, and a way through the air.
+    #[inline(always)]
     pub(super) fn gust(&self, part: f64, way: f64) -> Gust {
         let turbulence = if self.turbulence.is_empty() { Gust::default() } else { self.now.towards(&self.next, part) };
         let begun = self.discrete.iter().zip(&self.begins).filter_map(|(gust, begin)| Some((gust, (*begin)?)));

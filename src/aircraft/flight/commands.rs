@@ -26,7 +26,8 @@ impl Commands {
     }
 }
 
-/// `trim`: what is not given; `None` refuses that. Errors: a control nobody gives, a file that cannot be read or ends before `duration` (s).
+/// `trim`: what is not given; `None` refuses that. Errors: a control nobody gives, a file that cannot be read or ends
+/// before `duration` (s).
 pub(super) fn read(
     entry: &ControlsEntry,
     folder: &Path,

@@ -1,6 +1,7 @@
 //! flight.json: which airplane, where it starts, what moves its surfaces, through what air, with which sensors.
 //!
-//! Every number stands with its unit. `read` makes the document of a text; the structs here are its layout and its schema.
+//! Every number stands with its unit. `read` makes the document of a text; the structs here are its layout and its
+//! schema.
 
 mod read;
 
@@ -10,11 +11,12 @@ use std::path::{Path, PathBuf};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Serialize;
 
+use crate::aircraft::airframe::AirplaneDocument;
 use crate::aircraft::airframe::trim::{Sideways, TrimRequest, Turn};
 use crate::aircraft::atmosphere::discrete::Form;
 use crate::aircraft::atmosphere::dryden::Specification;
-use crate::params::place::{self, KeyError, Place};
-use crate::params::{Measured, Params};
+use crate::params::place::{self, DocumentError};
+use crate::params::{Measured, Params, ParamsDocument, Plain};
 
 pub const FORMAT: &str = "kfdesign-flight/1";
 
@@ -26,6 +28,7 @@ pub struct FlightDocument {
     #[schemars(extend("const" = FORMAT))]
     pub format: String,
     /// airplane.json: its path from this file, or the document itself.
+    #[schemars(schema_with = "linked::<AirplaneDocument>")]
     pub airplane: Linked,
     /// Steady flight to start from, and what controls not given below stand at.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -35,28 +38,30 @@ pub struct FlightDocument {
     pub initial: Option<InitialEntry>,
     /// Commands of the surfaces and the throttle; those of the trim where absent.
     #[serde(default)]
+    #[schemars(schema_with = "controls")]
     pub controls: ControlsEntry,
+    /// "flat" when absent.
     #[serde(default)]
+    #[schemars(schema_with = "earth")]
     pub earth: EarthEntry,
+    /// Height of the ground above the sea or the ellipsoid, where a flight ends; 0 m when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ground: Option<Measured>,
     /// Steady velocity of the air over the ground.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wind: Option<WindEntry>,
+    /// One, or a list.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(schema_with = "gusts")]
     pub gusts: Vec<GustEntry>,
     #[serde(default)]
     pub sensors: SensorsEntry,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub autopilot: Option<AutopilotEntry>,
-    /// For `loop`; not read here.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub feeds: Option<serde_json::Value>,
-    /// For `loop`; not read here.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub criteria: Option<serde_json::Value>,
 }
 
 /// Another document: a path, from the folder of this one, or the document itself.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Linked {
     Path(PathBuf),
@@ -116,7 +121,8 @@ pub struct InitialEntry {
     pub longitude: Option<Measured>,
 }
 
-/// Commands: fixed, or a log with a time column and columns elevator, aileron, rudder, throttle; each row holds until the next.
+/// Commands: fixed, or a log with a time column and columns elevator, aileron, rudder, throttle; each row holds until
+/// the next.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ControlsEntry {
@@ -128,6 +134,7 @@ pub struct ControlsEntry {
     pub rudder: Option<Measured>,
     /// 0 to 1.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Plain>")]
     pub throttle: Option<f64>,
     /// Of an airplane whose propulsion is a thrust.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -138,7 +145,7 @@ pub struct ControlsEntry {
 }
 
 /// "flat", or the place and heading at the start over the rotating WGS84 earth.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum EarthEntry {
     #[default]
@@ -166,7 +173,7 @@ pub struct WindEntry {
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(tag = "model")]
+#[serde(tag = "model", deny_unknown_fields)]
 pub enum GustEntry {
     /// Continuous turbulence of fixed height and airspeed.
     #[serde(rename = "dryden")]
@@ -177,18 +184,24 @@ pub enum GustEntry {
         /// Mean wind 20 ft above ground: 15, 30, 45 kt are light, moderate, severe.
         #[serde(skip_serializing_if = "Option::is_none")]
         wind_at_20ft: Option<Measured>,
-        /// Of u, v, w above 1000 ft.
+        /// Of u, v, w above 1000 ft; no `exceedance` beside it.
         #[serde(skip_serializing_if = "Option::is_none")]
         std_dev: Option<Measured>,
-        /// Above ground; the altitude of the start when absent.
+        /// The same by the chart of MIL-F-8785C, figure 7: the probability that it is exceeded. 1e-2, 1e-3, 1e-5 are
+        /// light, moderate, severe; 0.2, 0.1, 1e-4, 1e-6 have curves too.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schemars(with = "Option<Plain>")]
+        exceedance: Option<f64>,
+        /// Above ground; that of the start when absent.
         #[serde(skip_serializing_if = "Option::is_none")]
         height: Option<Measured>,
         /// Of the filters; that of the start when absent.
         #[serde(skip_serializing_if = "Option::is_none")]
         airspeed: Option<Measured>,
     },
-    /// A discrete gust along the way through the air.
+    /// A discrete gust along the way through the air: at least one of u, v, w.
     #[serde(rename = "1-cos")]
+    #[schemars(extend("anyOf" = [{ "required": ["u"] }, { "required": ["v"] }, { "required": ["w"] }]))]
     Discrete {
         /// hold: MIL-F-8785C, the velocity stays; return: it goes back to zero.
         #[schemars(with = "String", extend("enum" = ["hold", "return"]))]
@@ -228,10 +241,12 @@ pub struct SensorsEntry {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate: Option<Measured>,
     /// params.json of an angular rate: path or document, one axis for all or three.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(schema_with = "linked::<ParamsDocument>")]
     pub gyro: Option<Linked>,
     /// params.json of a specific force.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(schema_with = "linked::<ParamsDocument>")]
     pub accelerometer: Option<Linked>,
     /// Roll, pitch, yaw.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -263,8 +278,8 @@ impl JsonSchema for ErrorEntry {
         let measured = generator.subschema_for::<Measured>();
         let drift = generator.subschema_for::<DriftEntry>();
         json_schema!({
-            "description": "Errors of a measurement; one value with its unit is white noise alone: a density (deg/sqrt(Hz)) or the standard deviation \
-                            of one measurement (deg).",
+            "description": "Errors of a measurement; one value with its unit is white noise alone: \
+                            a density (deg/sqrt(Hz)) or the standard deviation of one measurement (deg).",
             "anyOf": [
                 measured,
                 {
@@ -297,15 +312,20 @@ pub struct GnssEntry {
     pub rate: Option<Measured>,
 }
 
-/// Rate dampers and attitude loops: δe = kq q + kθ(θ − θc), δa = −kp p − kφ(φ − φc), δr = kr · washout(r), all from trim.
+/// One law, `gains` or `lqr`; both work on deviations from the trim.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("oneOf" = [{ "required": ["gains"] }, { "required": ["lqr"] }]))]
 pub struct AutopilotEntry {
     pub rate: Measured,
     /// Whole samples from the measurement to the command at the servo; 1 when absent.
-    #[serde(default)]
+    #[serde(default = "one_sample")]
+    #[schemars(schema_with = "samples")]
     pub delay: u64,
-    pub gains: GainsEntry,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gains: Option<GainsEntry>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lqr: Option<LqrEntry>,
     /// Time constant of the complementary filter of gyro and attitude reference; 5 s when absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub attitude_filter: Option<Measured>,
@@ -316,12 +336,46 @@ pub struct AutopilotEntry {
     pub bank: Option<Measured>,
 }
 
+/// Weights of the linear-quadratic regulator u = −K x of the linear model about the trim, in continuous time; SI and
+/// rad. It needs the velocity through the air, which no sensor here shows, and takes the true one.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LqrEntry {
+    pub longitudinal: LongitudinalWeights,
+    pub lateral: LateralWeights,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LongitudinalWeights {
+    /// Of u, w, q, theta.
+    #[schemars(with = "[Plain; 4]")]
+    pub states: [f64; 4],
+    #[schemars(with = "Plain")]
+    pub elevator: f64,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LateralWeights {
+    /// Of v, p, r, phi.
+    #[schemars(with = "[Plain; 4]")]
+    pub states: [f64; 4],
+    #[schemars(with = "Plain")]
+    pub aileron: f64,
+    #[schemars(with = "Plain")]
+    pub rudder: f64,
+}
+
+/// Rate dampers and attitude loops: δe = kq q + kθ(θ − θc), δa = −kp p − kφ(φ − φc), δr = kr · washout(r).
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GainsEntry {
     pub kq: Measured,
+    #[schemars(with = "Plain")]
     pub ktheta: f64,
     pub kp: Measured,
+    #[schemars(with = "Plain")]
     pub kphi: f64,
     pub kr: Measured,
     /// 1 s when absent.
@@ -329,30 +383,14 @@ pub struct GainsEntry {
     pub washout: Option<Measured>,
 }
 
-/// A flight document that cannot be used.
-#[derive(Clone, Debug, thiserror::Error)]
-pub enum DocumentError {
-    #[error("{path}: cannot read: {reason}")]
-    Read { path: String, reason: String },
-    #[error("{path}: {error}")]
-    Syntax { path: String, error: place::SyntaxError },
-    /// The key is the path inside the document.
-    #[error("{path}: {error}")]
-    Key { path: String, error: KeyError },
-}
-
 impl FlightDocument {
     /// Every complaint names `path` and the key.
     pub fn from_json(text: &str, path: &str) -> Result<FlightDocument, DocumentError> {
-        let value = place::parse(text).map_err(|error| DocumentError::Syntax { path: path.into(), error })?;
-        read::flight(&Place::root(&value)).map_err(|error| DocumentError::Key { path: path.into(), error })
+        place::document(text, path, read::flight)
     }
 
     pub fn read(path: &Path) -> Result<FlightDocument, DocumentError> {
-        let shown = path.display().to_string();
-        let text = std::fs::read_to_string(path)
-            .map_err(|e| DocumentError::Read { path: shown.clone(), reason: e.to_string() })?;
-        FlightDocument::from_json(&text, &shown)
+        place::read(path, read::flight)
     }
 
     /// The published JSON schema.
@@ -366,13 +404,10 @@ impl Linked {
     pub fn text(&self, key: &str, folder: &Path) -> Result<(String, String), DocumentError> {
         match self {
             Linked::Document(value) => Ok((value.to_string(), key.to_string())),
-            Linked::Path(path) => {
-                let path = folder.join(path);
-                let shown = path.display().to_string();
-                let text = std::fs::read_to_string(&path)
-                    .map_err(|e| DocumentError::Read { path: format!("{key}: {shown}"), reason: e.to_string() })?;
-                Ok((text, shown))
-            }
+            Linked::Path(path) => place::file(&folder.join(path)).map_err(|error| match error {
+                DocumentError::Read { path, reason } => DocumentError::Read { path: format!("{key}: {path}"), reason },
+                other => other,
+            }),
         }
     }
 
@@ -382,4 +417,44 @@ impl Linked {
         let params = Params::from_json(&text, &shown).map_err(|e| e.to_string())?;
         Ok((params, shown))
     }
+}
+
+// layouts that are more than one type of value
+
+fn linked<T: JsonSchema>(generator: &mut SchemaGenerator) -> Schema {
+    let whole = generator.subschema_for::<T>();
+    json_schema!({ "anyOf": [{ "description": "Its path.", "type": "string" }, whole] })
+}
+
+fn controls(generator: &mut SchemaGenerator) -> Schema {
+    let fixed = generator.subschema_for::<ControlsEntry>();
+    json_schema!({ "anyOf": [fixed, { "description": "A log of commands: its path.", "type": "string" }] })
+}
+
+fn earth(generator: &mut SchemaGenerator) -> Schema {
+    let place = generator.subschema_for::<PlaceEntry>();
+    json_schema!({
+        "anyOf": [
+            { "description": "wgs84: with latitude and longitude in `initial`.", "enum": ["flat", "wgs84"] },
+            { "type": "object", "properties": { "wgs84": place }, "required": ["wgs84"], "additionalProperties": false }
+        ]
+    })
+}
+
+fn gusts(generator: &mut SchemaGenerator) -> Schema {
+    let gust = generator.subschema_for::<GustEntry>();
+    json_schema!({ "anyOf": [gust, { "type": "array", "items": gust }] })
+}
+
+fn one_sample() -> u64 {
+    1
+}
+
+fn samples(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({
+        "anyOf": [
+            { "type": "integer", "minimum": 0 },
+            { "description": "\"1 sample\"", "type": "string", "pattern": "^\\s*[0-9]+(\\s+samples?)?\\s*$" }
+        ]
+    })
 }

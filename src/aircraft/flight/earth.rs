@@ -37,7 +37,8 @@ impl Geodetic {
         [(n + self.height) * c * cl, (n + self.height) * c * sl, (n * (1.0 - E2) + self.height) * s]
     }
 
-    /// By Bowring's formula for the parametric latitude, twice (Bowring 1976, Survey Review 23): below 1e-9 m for flight.
+    /// By Bowring's formula for the parametric latitude, twice (Bowring 1976, Survey Review 23): below 1e-9 m for
+    /// flight.
     pub fn from_ecef([x, y, z]: [f64; 3]) -> Geodetic {
         let p = x.hypot(y);
         let b = A * (1.0 - F);
@@ -79,7 +80,7 @@ pub fn gravitation(r: [f64; 3]) -> [f64; 3] {
     [across * r[0], across * r[1], g * (1.0 + k * (3.0 - 5.0 * s2)) * r[2]]
 }
 
-/// What the earth does to a body at a place, in the axes of the position.
+/// What the earth does to a body at a place, in the axes of the body.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Field {
     /// Geometric height, m.
@@ -91,18 +92,28 @@ pub(super) struct Field {
 }
 
 impl Earth {
-    pub(super) fn field(self, r: Vector) -> Field {
+    /// At a position; `c` turns the axes of the body into those of the position.
+    #[inline(always)]
+    pub(super) fn field(self, r: Vector, c: &Matrix) -> Field {
         match self {
-            Earth::Flat => Field { height: -r[2], gravity: [0.0, 0.0, GRAVITY], rate: [0.0; 3] },
+            Earth::Flat => Field { height: -r[2], gravity: c[2].map(|x| x * GRAVITY), rate: [0.0; 3] },
             Earth::Wgs84 => {
                 let [x, y, z] = gravitation(r);
                 let square = EARTH_RATE * EARTH_RATE;
                 Field {
                     height: Geodetic::from_ecef(r).height,
-                    gravity: [x + square * r[0], y + square * r[1], z],
-                    rate: [0.0, 0.0, EARTH_RATE],
+                    gravity: back(c, [x + square * r[0], y + square * r[1], z]),
+                    rate: c[2].map(|x| x * EARTH_RATE),
                 }
             }
+        }
+    }
+
+    /// Geometric height of a position, m.
+    pub(super) fn height(self, r: Vector) -> f64 {
+        match self {
+            Earth::Flat => -r[2],
+            Earth::Wgs84 => Geodetic::from_ecef(r).height,
         }
     }
 

@@ -1,7 +1,7 @@
 //! An airplane over time: the `flight.json` document, earth, servos, autopilot, sensors (floor 4).
 //!
-//! [`Plan`] is a document with everything it names, in SI; [`fly`] flies it, run by run. Random numbers are addressed as `streams` says, so that
-//! no number depends on how many threads or runs there are.
+//! [`Plan`] is a document with everything it names, in SI; [`fly`] flies it, run by run. Random numbers are addressed
+//! as `streams` says, so that no number depends on how many threads or runs there are.
 
 mod air;
 mod autopilot;
@@ -20,7 +20,6 @@ mod streams;
 mod surfaces;
 mod vector;
 
-pub use autopilot::Gains;
 pub use document::FlightDocument;
 pub use plan::{Plan, STEP, Times};
 pub use report::{ColumnReport, FlightReport, RowSink, RunReport, fly};

@@ -2,24 +2,29 @@
 
 use std::path::Path;
 
+use nalgebra::{DMatrix, DVector};
+
 use super::FlightError;
-use super::autopilot::{Gains, Reference};
+use super::autopilot::{Gains, Law, Reference, StateFeedback};
 use super::commands::{self, Commands};
-use super::document::{EarthEntry, FlightDocument, GustEntry, WindEntry};
-use super::earth::{Earth, Geodetic};
+use super::document::{EarthEntry, FlightDocument, GustEntry, LqrEntry, WindEntry};
+use super::earth::Earth;
 use super::motion::{State, World};
 use super::sensors::{Errors, three_axes};
 use super::start::{self, Start};
 use super::surfaces::CONTROLS;
-use super::vector::{Vector, back, dot, matrix, minus, times};
+use super::vector::{Vector, dot, matrix, times};
 use crate::aircraft::airframe::Airplane;
+use crate::aircraft::airframe::linear::LinearModel;
 use crate::aircraft::atmosphere::discrete::DiscreteGust;
 use crate::aircraft::atmosphere::dryden::{Dryden, Intensity};
-use crate::aircraft::atmosphere::standard;
+use crate::aircraft::atmosphere::{AirError, exceedance, standard};
+use crate::aircraft::control::regulator::regulator;
 use crate::params::{Measured, Params};
 use crate::units::Quantity;
 
-/// Longest step of the integration when none is asked for, s: at 10 ms the error of 10 s is 1e-7 m, and gusts are followed to 0.3 %.
+/// Longest step of the integration when none is asked for, s: at 10 ms the error of 10 s is 1e-7 m, and gusts are
+/// followed to 0.3 %.
 pub const STEP: f64 = 0.0025;
 /// Samples per second without any sensor or autopilot, Hz.
 const RATE: f64 = 100.0;
@@ -56,7 +61,7 @@ impl Grid {
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AutopilotPlan {
-    pub gains: Gains,
+    pub law: Law,
     pub reference: Reference,
     /// Samples from one command to the next.
     pub every: u64,
@@ -73,6 +78,7 @@ pub(super) struct SensorPlan {
     pub accelerometer_position: Vector,
     pub attitude: Option<Errors>,
     pub airspeed: Option<Errors>,
+    pub airspeed_position: Vector,
     pub altitude: Option<Errors>,
     pub gnss_position: Option<Errors>,
     pub gnss_velocity: Option<Errors>,
@@ -84,6 +90,8 @@ pub(super) struct SensorPlan {
 pub struct Plan {
     pub(super) airplane: Airplane,
     pub(super) earth: Earth,
+    /// Its height, m.
+    pub(super) ground: f64,
     pub(super) wind: Vector,
     pub(super) start: State,
     pub(super) commands: Commands,
@@ -115,9 +123,16 @@ impl Plan {
             document.wind.as_ref().map_or([0.0; 3], |WindEntry { north, east, down }| [north, east, down].map(si));
         let Start { state, controls, reference, altitude } = start::start(document, &airplane, earth, wind)?;
         standard::at(altitude).map_err(|e| at("altitude")(e.to_string()))?;
+        let ground = si(&document.ground);
+        if altitude < ground {
+            return Err(FlightError(format!(
+                "altitude: {altitude} m is below the ground at {ground} m; start higher, or give the ground its height"
+            )));
+        }
         let world = World::new(&airplane, earth, wind);
-        let airspeed = airspeed(&world, &state);
-        let (dryden, discrete) = gusts(document, altitude, airspeed, airplane.size.span)?;
+        let through_air = world.through_air(&state);
+        let airspeed = dot(through_air, through_air).sqrt();
+        let (dryden, discrete) = gusts(document, altitude - ground, airspeed, airplane.size.span)?;
         let sensors = &document.sensors;
         let read = |key: &str, linked: &Option<super::document::Linked>, quantity: Quantity, what: &str| {
             let key = format!("sensors.{key}");
@@ -152,19 +167,21 @@ impl Plan {
             gyro,
             accelerometer,
             accelerometer_position: airplane.position("accelerometer"),
+            airspeed_position: airplane.position("airspeed"),
             gnss_antenna: airplane.position("gnss"),
         };
         let commands = commands::read(&document.controls, folder, controls, times.duration)?;
         let [elevator, aileron, rudder, _] = commands.fixed;
         let reference = Reference { surfaces: [elevator, aileron, rudder], ..reference };
-        let autopilot = autopilot(document, reference, &grid, sensors.attitude.is_some())?;
+        let autopilot = autopilot(document, &airplane, reference, &grid, sensors.attitude.is_some())?;
         if autopilot.is_some() && commands.rows.iter().any(|(_, row)| row[..3] != commands.fixed[..3]) {
             return Err(FlightError(
                 "controls.file: moves a surface that the autopilot moves; leave one of them out".into(),
             ));
         }
         start::check_travel(&airplane, &commands)?;
-        let plan = Plan { airplane, earth, wind, start: state, commands, dryden, discrete, sensors, autopilot, grid };
+        let plan =
+            Plan { airplane, earth, ground, wind, start: state, commands, dryden, discrete, sensors, autopilot, grid };
         plan.check_step()?;
         Ok(plan)
     }
@@ -188,32 +205,25 @@ impl Plan {
     }
 }
 
-/// Through the steady air.
-fn airspeed(world: &World<'_>, x: &State) -> f64 {
-    let c = matrix(super::motion::attitude(x));
-    let wind = back(&c, world.earth.of_local(super::motion::position(x), world.wind));
-    let v = minus(super::motion::velocity(x), wind);
-    dot(v, v).sqrt()
-}
-
 fn gusts(
     document: &FlightDocument,
-    altitude: f64,
+    above_ground: f64,
     speed: f64,
     span: f64,
 ) -> Result<(Vec<Dryden>, Vec<DiscreteGust>), FlightError> {
     let (mut dryden, mut discrete) = (Vec::new(), Vec::new());
     for (i, gust) in document.gusts.iter().enumerate() {
         match gust {
-            GustEntry::Dryden { specification, wind_at_20ft, std_dev, height, airspeed } => {
-                let height = height.as_ref().map_or(altitude, Measured::si);
+            GustEntry::Dryden { specification, wind_at_20ft, std_dev, exceedance, height, airspeed } => {
+                let refused = |e: AirError| at(&format!("gusts[{i}]"))(e.to_string());
+                let height = height.as_ref().map_or(above_ground, Measured::si);
+                let of_chart = |probability| exceedance::std_dev(probability, height).map_err(refused);
                 let intensity = Intensity {
                     wind_at_20ft: wind_at_20ft.as_ref().map(Measured::si),
-                    std_dev_aloft: std_dev.as_ref().map(Measured::si),
+                    std_dev_aloft: std_dev.as_ref().map(|m| Ok(m.si())).or(exceedance.map(of_chart)).transpose()?,
                 };
                 let speed = airspeed.as_ref().map_or(speed, Measured::si);
-                let gust = Dryden::new(*specification, height, intensity, speed, span);
-                dryden.push(gust.map_err(|e| at(&format!("gusts[{i}]"))(e.to_string()))?);
+                dryden.push(Dryden::new(*specification, height, intensity, speed, span).map_err(refused)?);
             }
             GustEntry::Discrete { form, length, u, v, w, start } => discrete.push(DiscreteGust {
                 form: *form,
@@ -267,6 +277,7 @@ fn grid(times: &Times, given: Option<f64>) -> Result<Grid, FlightError> {
 
 fn autopilot(
     document: &FlightDocument,
+    airplane: &Airplane,
     mut reference: Reference,
     grid: &Grid,
     measured: bool,
@@ -282,16 +293,20 @@ fn autopilot(
     if let Some(pitch) = &entry.pitch {
         reference.angles[1] = pitch.si();
     }
-    let gains = &entry.gains;
-    Ok(Some(AutopilotPlan {
-        gains: Gains {
+    let law = match (&entry.gains, &entry.lqr) {
+        (Some(gains), _) => Law::Gains(Gains {
             kq: gains.kq.si(),
             ktheta: gains.ktheta,
             kp: gains.kp.si(),
             kphi: gains.kphi,
             kr: gains.kr.si(),
             washout: gains.washout.as_ref().map_or(1.0, Measured::si),
-        },
+        }),
+        (None, Some(lqr)) => Law::Regulator(state_feedback(lqr, document, airplane).map_err(at("autopilot.lqr"))?),
+        (None, None) => return Err(FlightError("autopilot: expected one of gains and lqr".into())),
+    };
+    Ok(Some(AutopilotPlan {
+        law,
         reference,
         every,
         delay: entry.delay as f64 / rate,
@@ -299,18 +314,23 @@ fn autopilot(
     }))
 }
 
-/// A place and the attitude there as a state; `velocity` and `rate` in body axes, relative to the earth.
-pub(super) fn state(earth: Earth, place: Geodetic, euler: Vector, velocity: Vector, rate: Vector) -> State {
-    let r = match earth {
-        Earth::Flat => [0.0, 0.0, -place.height],
-        Earth::Wgs84 => place.to_ecef(),
+/// Optimal gains about the trim of the document.
+fn state_feedback(lqr: &LqrEntry, document: &FlightDocument, airplane: &Airplane) -> Result<StateFeedback, String> {
+    let entry = document.trim.as_ref().ok_or("needs a trim, about which its gains are made; give trim too")?;
+    let trim = start::trim(entry, airplane).map_err(|e| e.to_string())?;
+    let models = airplane.linear(&trim);
+    let diagonal = |weights: &[f64]| DMatrix::from_diagonal(&DVector::from_column_slice(weights));
+    let gain = |model: &LinearModel, inputs: &[&str], states: &[f64; 4], weights: &[f64]| {
+        let columns: Vec<usize> = (0..model.inputs.len()).filter(|i| inputs.contains(&model.inputs[*i].0)).collect();
+        regulator(&model.a, &model.b.select_columns(&columns), &diagonal(states), &diagonal(weights))
+            .map(|found| found.gain)
+            .map_err(|e| format!("no optimal gains of the {} motion: {e}; give other weights", model.name))
     };
-    let attitude = earth.attitude(r, &super::vector::from_euler(euler));
-    let c = matrix(attitude);
-    let inertial = super::vector::plus(rate, back(&c, earth.field(r).rate));
-    let [a, b, d] = [r, velocity, inertial];
-    let e = attitude;
-    [a[0], a[1], a[2], b[0], b[1], b[2], e[0], e[1], e[2], e[3], d[0], d[1], d[2], 0.0]
+    let (x, y) = (&lqr.longitudinal, &lqr.lateral);
+    let along = gain(&models.longitudinal, &["elevator"], &x.states, &[x.elevator])?;
+    let across = gain(&models.lateral, &["aileron", "rudder"], &y.states, &[y.aileron, y.rudder])?;
+    let row = |gain: &DMatrix<f64>, i: usize| std::array::from_fn(|j| gain[(i, j)]);
+    Ok(StateFeedback { along: row(&along, 0), across: [row(&across, 0), row(&across, 1)], velocity: trim.velocity })
 }
 
 /// Where a point of the airplane is and how it moves, north, east, down from the start.

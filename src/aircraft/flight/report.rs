@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::FlightError;
 use super::plan::Plan;
-use super::rows::{self, Row};
+use super::rows;
 use crate::numerics::reduce::Moments;
 
 /// What `fly` says of its runs; the rows themselves are in the logs.
@@ -61,6 +61,9 @@ pub trait RowSink<E> {
     fn finish(self) -> Result<Option<String>, E>;
 }
 
+/// Values looked at together.
+const LANES: usize = 8;
+
 /// Rows handed over at once.
 const BLOCK: usize = 1024;
 
@@ -84,8 +87,8 @@ impl Plan {
     }
 }
 
-/// Flies runs 0 … `runs` − 1 on all threads; `open` gives the place for the rows of a run. Memory does not grow with the length of a flight. Errors: the
-/// first run that fails, in the order of runs.
+/// Flies runs 0 … `runs` − 1 on all threads; `open` gives the place for the rows of a run. Memory does not grow with
+/// the length of a flight. Errors: the first run that fails, in the order of runs.
 pub fn fly<E, S>(
     plan: &Plan,
     seed: u64,
@@ -110,7 +113,7 @@ where
     })
 }
 
-/// Running figures of a column.
+/// Running figures of a column, over the values that are there.
 #[derive(Clone, Copy)]
 struct Figures {
     moments: Moments,
@@ -119,32 +122,53 @@ struct Figures {
     last: f64,
 }
 
-fn one<E: From<FlightError>, S: RowSink<E>>(plan: &Plan, seed: u64, run: u64, mut sink: S) -> Result<RunReport, E> {
-    let names = plan.columns();
-    let new =
-        Figures { moments: Moments::default(), least: f64::INFINITY, greatest: f64::NEG_INFINITY, last: f64::NAN };
-    let mut figures = vec![new; names.len()];
-    let mut block: Vec<Vec<f64>> = vec![Vec::with_capacity(BLOCK); names.len()];
-    let mut count = 0;
-    plan.fly(seed, run, |Row(values)| {
-        for ((column, figures), value) in block.iter_mut().zip(&mut figures).zip(values) {
-            column.push(*value);
-            if value.is_finite() {
-                figures.moments.add(*value);
-                figures.least = figures.least.min(*value);
-                figures.greatest = figures.greatest.max(*value);
-                figures.last = *value;
+impl Figures {
+    const NONE: Figures =
+        Figures { moments: Moments::NONE, least: f64::INFINITY, greatest: f64::NEG_INFINITY, last: f64::NAN };
+
+    /// `there` is room for the values of a column that has gaps.
+    fn add(&mut self, column: &[f64], there: &mut Vec<f64>) {
+        let values = if column.iter().all(|x| x.is_finite()) {
+            column
+        } else {
+            there.clear();
+            there.extend(column.iter().copied().filter(|x| x.is_finite()));
+            there
+        };
+        self.moments.merge(&Moments::of(values));
+        let (parts, rest) = values.as_chunks::<LANES>();
+        let (mut least, mut greatest) = ([self.least; LANES], [self.greatest; LANES]);
+        for part in parts {
+            for (i, x) in part.iter().enumerate() {
+                least[i] = if *x < least[i] { *x } else { least[i] };
+                greatest[i] = if *x > greatest[i] { *x } else { greatest[i] };
             }
         }
-        count += 1;
-        if count % BLOCK as u64 == 0 {
-            sink.write(&block)?;
-            block.iter_mut().for_each(Vec::clear);
-        }
+        self.least = least.iter().chain(rest).copied().fold(self.least, f64::min);
+        self.greatest = greatest.iter().chain(rest).copied().fold(self.greatest, f64::max);
+        self.last = values.last().copied().unwrap_or(self.last);
+    }
+}
+
+fn one<E: From<FlightError>, S: RowSink<E>>(plan: &Plan, seed: u64, run: u64, mut sink: S) -> Result<RunReport, E> {
+    let names = plan.columns();
+    let mut figures = vec![Figures::NONE; names.len()];
+    let mut there = Vec::new();
+    let mut block: Vec<Vec<f64>> = vec![Vec::with_capacity(BLOCK); names.len()];
+    let mut count = 0;
+    let mut hand_over = |block: &mut [Vec<f64>]| {
+        figures.iter_mut().zip(&*block).for_each(|(figures, column)| figures.add(column, &mut there));
+        sink.write(block)?;
+        block.iter_mut().for_each(Vec::clear);
         Ok::<(), E>(())
+    };
+    plan.fly(seed, run, |row| {
+        block.iter_mut().zip(row).for_each(|(column, value)| column.push(*value));
+        count += 1;
+        if count % BLOCK as u64 == 0 { hand_over(&mut block) } else { Ok(()) }
     })?;
-    if block.iter().any(|column| !column.is_empty()) {
-        sink.write(&block)?;
+    if count % BLOCK as u64 != 0 {
+        hand_over(&mut block)?;
     }
     let columns = names
         .into_iter()

@@ -8,7 +8,7 @@ use super::plan::{Plan, point};
 use super::sensors::{Channel, Errors, Inertial, InertialErrors};
 use super::streams;
 use super::surfaces::Surfaces;
-use super::vector::{Vector, back, cross, plus, to_euler};
+use super::vector::{Vector, back, cross, dot, plus, to_euler};
 use crate::aircraft::atmosphere::{Gust, standard};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -17,9 +17,12 @@ const ANGLES: [&str; 3] = ["phi", "theta", "psi"];
 const BODY: [(&str, &str); 6] =
     [("u", "m/s"), ("v", "m/s"), ("w", "m/s"), ("p", "rad/s"), ("q", "rad/s"), ("r", "rad/s")];
 
-/// What the sensors showed at one sample, SI; NaN where they did not measure. The gyro shows the truth where there is none.
+/// What the sensors showed at one sample, SI; NaN where they did not measure. The gyro shows the truth where there is
+/// none.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Measured {
+    /// The true attitude.
+    euler: Vector,
     pub gyro: Vector,
     pub attitude: Vector,
     accelerometer: Vector,
@@ -83,20 +86,34 @@ impl Measurements {
         let euler = to_euler(&plan.earth.body_to_local(position(x), attitude(x)));
         let angles = plus(euler, three(&mut self.attitude));
         let (way, speed) = (three(&mut self.gnss_position), three(&mut self.gnss_velocity));
-        let (antenna, antenna_velocity) = point(plan, x, instant.rate, plan.sensors.gnss_antenna);
+        let gnss = !(self.gnss_position.is_empty() && self.gnss_velocity.is_empty());
+        let (antenna, antenna_velocity) =
+            if gnss { point(plan, x, instant.rate, plan.sensors.gnss_antenna) } else { ([0.0; 3], [0.0; 3]) };
         Measured {
+            euler,
             gyro: plus(rate, gyro.all),
             attitude: angles,
             accelerometer: plus(specific_force, accelerometer.all),
-            airspeed: instant.airspeed + self.airspeed.as_mut().map_or(0.0, |channel| channel.error(sample)),
+            airspeed: airspeed(instant, plan.sensors.airspeed_position)
+                + self.airspeed.as_mut().map_or(0.0, |channel| channel.error(sample)),
             altitude: standard::geopotential(instant.height)
                 + self.altitude.as_mut().map_or(0.0, |channel| channel.error(sample)),
-            gnss_position: place(plan.earth, plus(antenna, back(&plan.earth.local(antenna), way))),
+            gnss_position: if gnss {
+                place(plan.earth, plus(antenna, back(&plan.earth.local(antenna), way)))
+            } else {
+                antenna
+            },
             gnss_velocity: plus(antenna_velocity, speed),
             errors: [gyro, accelerometer],
             specific_force,
         }
     }
+}
+
+/// Of a point of the airplane: the air turns with its gust like a rigid body.
+fn airspeed(instant: &Instant, arm: Vector) -> f64 {
+    let v = plus(instant.air.velocity, cross(instant.air.rate, arm));
+    dot(v, v).sqrt()
 }
 
 /// North, east, down, or latitude, longitude, height.
@@ -170,62 +187,56 @@ pub(super) fn header(plan: &Plan) -> Vec<String> {
     names
 }
 
-/// One row in the order of [`header`].
-#[derive(Clone, Debug)]
-pub(super) struct Row(pub Vec<f64>);
-
-impl Row {
-    pub(super) fn new(
-        plan: &Plan,
-        time: f64,
-        x: &State,
-        instant: &Instant,
-        surfaces: &Surfaces,
-        gust: &Gust,
-        measured: &Measured,
-    ) -> Row {
-        let mut row = Vec::with_capacity(64);
-        row.push(time);
-        row.extend(shown(plan.earth, place(plan.earth, position(x))));
-        row.extend(velocity(x));
-        row.extend(to_euler(&plan.earth.body_to_local(position(x), attitude(x))));
-        row.extend(instant.rate);
-        let controls = surfaces.controls();
-        row.extend([controls.elevator, controls.aileron, controls.rudder, controls.throttle]);
-        if plan.has_gusts() {
-            row.extend(gust.velocity);
-            row.extend(gust.rate);
-        }
-        let sensors = &plan.sensors;
-        if sensors.gyro.is_some() {
-            row.extend(measured.gyro);
-        }
-        if sensors.accelerometer.is_some() {
-            row.extend(measured.accelerometer);
-        }
-        if sensors.attitude.is_some() {
-            row.extend(measured.attitude);
-        }
-        if sensors.airspeed.is_some() {
-            row.push(measured.airspeed);
-        }
-        if sensors.altitude.is_some() {
-            row.push(measured.altitude);
-        }
-        if sensors.gnss_position.is_some() {
-            row.extend(shown(plan.earth, measured.gnss_position));
-        }
-        if sensors.gnss_velocity.is_some() {
-            row.extend(measured.gnss_velocity);
-        }
-        let truths = [inertial_rate(x), measured.specific_force];
-        let there = [sensors.gyro.is_some(), sensors.accelerometer.is_some()];
-        for ((truth, errors), _) in truths.iter().zip(&measured.errors).zip(there).filter(|(_, there)| *there) {
-            for ((truth, bias), drift) in truth.iter().zip(errors.bias).zip(errors.drift) {
-                row.extend([*truth, bias, drift]);
-            }
-        }
-        row.extend(surfaces.rates());
-        Row(row)
+/// One row in the order of [`header`], in the place of the one before.
+pub(super) fn row(
+    row: &mut Vec<f64>,
+    plan: &Plan,
+    time: f64,
+    (x, instant): (&State, &Instant),
+    surfaces: &Surfaces,
+    gust: &Gust,
+    measured: &Measured,
+) {
+    row.clear();
+    row.push(time);
+    row.extend(shown(plan.earth, place(plan.earth, position(x))));
+    row.extend(velocity(x));
+    row.extend(measured.euler);
+    row.extend(instant.rate);
+    let controls = surfaces.controls();
+    row.extend([controls.elevator, controls.aileron, controls.rudder, controls.throttle]);
+    if plan.has_gusts() {
+        row.extend(gust.velocity);
+        row.extend(gust.rate);
     }
+    let sensors = &plan.sensors;
+    if sensors.gyro.is_some() {
+        row.extend(measured.gyro);
+    }
+    if sensors.accelerometer.is_some() {
+        row.extend(measured.accelerometer);
+    }
+    if sensors.attitude.is_some() {
+        row.extend(measured.attitude);
+    }
+    if sensors.airspeed.is_some() {
+        row.push(measured.airspeed);
+    }
+    if sensors.altitude.is_some() {
+        row.push(measured.altitude);
+    }
+    if sensors.gnss_position.is_some() {
+        row.extend(shown(plan.earth, measured.gnss_position));
+    }
+    if sensors.gnss_velocity.is_some() {
+        row.extend(measured.gnss_velocity);
+    }
+    let truths = [inertial_rate(x), measured.specific_force];
+    let there = [sensors.gyro.is_some(), sensors.accelerometer.is_some()];
+    for ((truth, errors), _) in truths.iter().zip(&measured.errors).zip(there).filter(|(_, there)| *there) {
+        for ((truth, bias), drift) in truth.iter().zip(errors.bias).zip(errors.drift) {
+            row.extend([*truth, bias, drift]);
+        }
+    }
+    row.extend(surfaces.rates());
 }

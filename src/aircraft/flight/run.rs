@@ -3,14 +3,15 @@
 use super::FlightError;
 use super::air::MovingAir;
 use super::autopilot::Autopilot;
-use super::motion::{Instant, State, World, attitude, step};
+use super::motion::{Rate, State, World, attitude, position, step};
 use super::plan::Plan;
-use super::rows::{Measurements, Row};
+use super::rows::{self, Measurements};
 use super::start::servo_of;
-use super::surfaces::{SAME_TIME, Surface, Surfaces};
+use super::surfaces::{Surface, Surfaces};
 use super::vector::to_euler;
 use crate::aircraft::airframe::Controls;
-use crate::aircraft::atmosphere::{AirError, Gust};
+use crate::aircraft::atmosphere::Gust;
+use crate::aircraft::atmosphere::standard::DensityNear;
 use crate::numerics::linalg::eigenvalues;
 use nalgebra::DMatrix;
 
@@ -24,42 +25,47 @@ struct Flying<'a> {
     x: State,
     surfaces: Surfaces,
     air: MovingAir,
+    density: DensityNear,
     /// First of the rows of commands that is not ordered yet.
     next_command: usize,
 }
 
 impl Plan {
-    /// Flies run number `run` and hands out the rows in order. Errors: the airplane leaves the standard atmosphere, the integration becomes unstable, or what
-    /// `row` says.
+    /// Flies run number `run` and hands out the rows in order. Errors: the airplane meets the ground or leaves the
+    /// standard atmosphere, the integration becomes unstable, or what `hand_out` says.
     pub(super) fn fly<E: From<FlightError>>(
         &self,
         seed: u64,
         run: u64,
-        mut row: impl FnMut(&Row) -> Result<(), E>,
+        mut hand_out: impl FnMut(&[f64]) -> Result<(), E>,
     ) -> Result<(), E> {
         let mut flying = Flying::new(self, seed, run)?;
         let mut measurements = Measurements::new(self, seed, run)?;
+        let mut row = Vec::new();
         let euler = flying.euler();
         let mut autopilot = self.autopilot.map(|a| {
-            Autopilot::new(a.gains, a.reference, a.every as f64 / self.grid.rate, a.filter, [euler[0], euler[1]])
+            Autopilot::new(a.law, a.reference, a.every as f64 / self.grid.rate, a.filter, [euler[0], euler[1]])
         });
         for sample in 0..=self.grid.samples {
             let time = sample as f64 / self.grid.rate;
             flying.surfaces.receive(time);
             flying.air.begin(time, flying.x[13]);
             let gust = flying.air.gust(0.0, flying.x[13]);
-            let instant = flying.instant(time, &gust)?;
+            let density = flying.density(time)?;
+            let instant = flying.world.instant(&flying.x, &flying.surfaces.controls(), &gust, &density);
             let measured = measurements.take(self, sample, &flying.x, &instant);
             if let (Some(autopilot), Some(plan)) = (&mut autopilot, &self.autopilot)
                 && sample.is_multiple_of(plan.every)
             {
-                let command = autopilot.command(measured.gyro, [measured.attitude[0], measured.attitude[1]]);
+                let angles = [measured.attitude[0], measured.attitude[1]];
+                let command = autopilot.command(measured.gyro, angles, flying.world.through_air(&flying.x));
                 for (surface, command) in flying.surfaces.0.iter_mut().zip(command) {
                     surface.order(time + plan.delay, command);
                 }
             }
             if sample.is_multiple_of(self.grid.row) || sample == self.grid.samples {
-                row(&Row::new(self, time, &flying.x, &instant, &flying.surfaces, &gust, &measured))?;
+                rows::row(&mut row, self, time, (&flying.x, &instant), &flying.surfaces, &gust, &measured);
+                hand_out(&row)?;
             }
             if sample < self.grid.samples {
                 flying.advance(sample)?;
@@ -68,13 +74,20 @@ impl Plan {
         Ok(())
     }
 
+    /// About the start. Errors: outside the standard atmosphere.
+    fn density(&self) -> Result<DensityNear, FlightError> {
+        let height = self.earth.height(position(&self.start));
+        DensityNear::new(height).map_err(|e| FlightError(format!("at the start: {e}")))
+    }
+
     /// The linear motion about the start is one that the step can follow. Errors: it is not, with the step.
     pub(super) fn check_step(&self) -> Result<(), FlightError> {
         let world = self.world();
         let [elevator, aileron, rudder, throttle] = self.initial_commands();
         let controls = Controls { elevator, aileron, rudder, throttle };
-        let rate = |x: &State| world.instant(x, &controls, &Gust::default());
-        let at = rate(&self.start).map_err(|e| FlightError(format!("at the start: {e}")))?.derivative;
+        let density = self.density()?;
+        let rate = |x: &State| world.instant(x, &controls, &Gust::default(), &density).derivative;
+        let at = rate(&self.start);
         // velocity and rate are where fast modes live; a millionth of their size is small against what is not linear
         let fast = [3, 4, 5, 10, 11, 12];
         let mut jacobian = DMatrix::zeros(6, 6);
@@ -82,7 +95,7 @@ impl Plan {
             let by = 1e-6 * if state < 10 { self.start[3].abs().max(1.0) } else { 1.0 };
             let mut x = self.start;
             x[state] += by;
-            let moved = rate(&x).map_err(|e| FlightError(format!("at the start: {e}")))?.derivative;
+            let moved = rate(&x);
             for (i, &row) in fast.iter().enumerate() {
                 jacobian[(i, j)] = (moved[row] - at[row]) / by;
             }
@@ -91,8 +104,8 @@ impl Plan {
         let h = self.step();
         if fastest * h > STABLE {
             return Err(FlightError(format!(
-                "a step of {h} s is too long for this airplane, whose fastest mode has {fastest:.1} rad/s: the integration would be unstable; \
-                 give `step` {:.1e} s or less",
+                "a step of {h} s is too long for this airplane, whose fastest mode has {fastest:.1} rad/s: \
+                 the integration would be unstable; give `step` {:.1e} s or less",
                 1.0 / fastest
             )));
         }
@@ -116,23 +129,31 @@ impl<'a> Flying<'a> {
             x: plan.start,
             surfaces: Surfaces(std::array::from_fn(surface)),
             air,
+            density: plan.density()?,
             next_command,
         })
     }
 
     fn euler(&self) -> [f64; 3] {
-        to_euler(&self.plan.earth.body_to_local(super::motion::position(&self.x), attitude(&self.x)))
+        to_euler(&self.plan.earth.body_to_local(position(&self.x), attitude(&self.x)))
     }
 
-    fn instant(&self, time: f64, gust: &Gust) -> Result<Instant, FlightError> {
-        self.world.instant(&self.x, &self.surfaces.controls(), gust).map_err(|e| self.outside(time, &e))
-    }
-
-    fn outside(&self, time: f64, error: &AirError) -> FlightError {
-        if self.unsteady() {
-            return self.unstable(time);
+    /// About where the airplane is. Errors: on the ground, outside the standard atmosphere, or nowhere at all.
+    fn density(&mut self, time: f64) -> Result<DensityNear, FlightError> {
+        let height = self.plan.earth.height(position(&self.x));
+        let ground = self.plan.ground;
+        if height < ground && !self.unsteady() {
+            return Err(FlightError(format!(
+                "at {time:.3} s: the airplane meets the ground, which is at {ground} m; start higher, or end the \
+                 flight before with `duration`"
+            )));
         }
-        FlightError(format!("at {time:.3} s: {error}"))
+        if !self.density.reaches(height) {
+            self.density = DensityNear::new(height).map_err(|error| {
+                if self.unsteady() { self.unstable(time) } else { FlightError(format!("at {time:.3} s: {error}")) }
+            })?;
+        }
+        Ok(self.density)
     }
 
     /// Rotation of more than a radian in a step cannot be followed by it.
@@ -162,15 +183,17 @@ impl<'a> Flying<'a> {
             self.next_command += 1;
         }
         for i in 0..grid.steps {
-            let (from, to) = (start + i as f64 * h, if i + 1 == grid.steps { end } else { start + (i + 1) as f64 * h });
-            let mut now = from;
-            while now < to - SAME_TIME {
+            let from = start + i as f64 * h;
+            // times and parts of the step: a whole one is h to the last bit, so that servos know it again
+            let (mut now, mut first) = (from, 0.0);
+            while first < 1.0 {
                 self.surfaces.receive(now);
                 self.air.begin(now, self.x[13]);
-                let cuts = [self.surfaces.next_arrival(now, to), self.air.next_begin(now, to)];
-                let next = cuts.into_iter().flatten().fold(to, f64::min);
-                self.piece(now, next - now, (now - from) / h, (next - from) / h)?;
-                now = next;
+                let cuts = [self.surfaces.next_arrival(now, from + h), self.air.next_begin(now, from + h)];
+                let cut = cuts.into_iter().flatten().min_by(f64::total_cmp);
+                let (next, last) = cut.map_or((from + h, 1.0), |cut| (cut, (cut - from) / h));
+                self.piece(now, (last - first) * h, first, last)?;
+                (now, first) = (next, last);
             }
             self.air.step();
         }
@@ -181,6 +204,7 @@ impl<'a> Flying<'a> {
     }
 
     /// A step with `parts`: where in the step of the turbulence it begins and ends.
+    #[inline(always)]
     fn piece(&mut self, now: f64, h: f64, first: f64, last: f64) -> Result<(), FlightError> {
         let mut controls = [self.surfaces.controls(); 3];
         for controls in controls.iter_mut().skip(1) {
@@ -188,12 +212,27 @@ impl<'a> Flying<'a> {
             *controls = self.surfaces.controls();
         }
         let parts = [first, 0.5 * (first + last), last];
+        let density = self.density(now)?;
         let (world, air) = (&self.world, &self.air);
-        let rate = |stage: usize, x: &State| {
-            let gust = air.gust(parts[stage], x[13]);
-            world.instant(x, &controls[stage], &gust).map(|instant| instant.derivative)
-        };
-        self.x = step(&self.x, h, rate).map_err(|e| self.outside(now, &e))?;
+        self.x = step(&self.x, h, &Stages { world, air, parts, controls, density });
         Ok(())
+    }
+}
+
+/// Surroundings of the airplane during a step.
+struct Stages<'a> {
+    world: &'a World<'a>,
+    air: &'a MovingAir,
+    /// Of the step of the turbulence, at the beginning, the middle and the end.
+    parts: [f64; 3],
+    controls: [Controls; 3],
+    density: DensityNear,
+}
+
+impl Rate for Stages<'_> {
+    #[inline(always)]
+    fn rate(&self, part: usize, x: &State) -> State {
+        let gust = self.air.gust(self.parts[part], x[13]);
+        self.world.instant(x, &self.controls[part], &gust, &self.density).derivative
     }
 }

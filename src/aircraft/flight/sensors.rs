@@ -22,7 +22,8 @@ pub(super) struct Errors {
 }
 
 impl Errors {
-    /// At samples of `rate` (Hz); `own` is the rate of the instrument if the entry has none. Errors: no whole fraction of the rate.
+    /// At samples of `rate` (Hz); `own` is the rate of the instrument if the entry has none. Errors: no whole fraction
+    /// of the rate.
     pub(super) fn new(entry: &ErrorEntry, own: Option<f64>, rate: f64) -> Result<Errors, String> {
         let measured = entry.rate.as_ref().map(|rate| rate.si()).or(own).unwrap_or(rate);
         let every = (rate / measured).round();

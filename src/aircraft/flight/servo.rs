@@ -1,8 +1,8 @@
 //! A servo of second order with limits of rate and travel, by its closed form.
 //!
-//! δ̇ = v, v̇ = ω²(δc − δ) − 2ζω v. At the rate limit |v| = R it runs at constant rate while v̇ would lead beyond; at a stop δ stays with v = 0 while
-//! the law pushes outward. Between such moments the motion is linear and its solution exact; the moments are found to rounding, so that the result
-//! does not depend on the length of the steps.
+//! δ̇ = v, v̇ = ω²(δc − δ) − 2ζω v. At the rate limit |v| = R it runs at constant rate while v̇ would lead beyond; at a
+//! stop δ stays with v = 0 while the law pushes outward. Between such moments the motion is linear and its solution
+//! exact; the moments are found to rounding, so that the result does not depend on the length of the steps.
 
 /// What a servo is; angles in rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,28 +38,44 @@ impl Servo {
         self.advance_again(state, command, dt, &mut None);
     }
 
-    /// The same; `known` is the linear motion of the call before, which serves again when the time is the same.
-    pub(super) fn advance_again(&self, state: &mut ServoState, command: f64, dt: f64, known: &mut Option<Transition>) {
-        let parts = (self.frequency * dt / LONGEST_TURN).ceil().max(1.0);
-        let part = dt / parts;
-        let whole = match known {
-            Some(transition) if transition.dt == part => *transition,
-            _ => *known.insert(self.transition(part)),
+    /// The same; `known` is the motion of the call before, which serves again when the time is the same.
+    #[inline(always)]
+    pub(super) fn advance_again(&self, state: &mut ServoState, command: f64, dt: f64, known: &mut Option<Motion>) {
+        let motion = match known {
+            Some(motion) if motion.time == dt => motion,
+            _ => {
+                let parts = (self.frequency * dt / LONGEST_TURN).ceil().max(1.0);
+                known.insert(Motion { time: dt, parts: parts as u64, part: self.transition(dt / parts) })
+            }
         };
-        for _ in 0..parts as u64 {
-            self.advance_part(state, command, &whole);
+        for _ in 0..motion.parts {
+            self.advance_part(state, command, &motion.part);
         }
     }
 
+    #[inline(always)]
     fn advance_part(&self, state: &mut ServoState, command: f64, whole: &Transition) {
-        let dt = whole.dt;
+        // quick: far from every limit from the beginning to the end
+        let (start, end) = (*state, whole.apply(*state, command));
+        let accelerations = [start, end].map(|s| self.acceleration(s, command).abs());
+        let fastest = start.rate.abs().max(end.rate.abs()) + accelerations[0].max(accelerations[1]) * whole.dt;
+        let room = |s: ServoState| (self.travel[1] - s.angle).min(s.angle - self.travel[0]);
+        if fastest < self.rate_limit && room(start).min(room(end)) > fastest * whole.dt {
+            *state = end;
+            return;
+        }
+        self.advance_limited(state, command, whole.dt);
+    }
+
+    /// Through the regimes that limits make.
+    fn advance_limited(&self, state: &mut ServoState, command: f64, dt: f64) {
         let mut left = dt;
         // each pass ends at a limit or at the end; a pass of no length at all changes the regime at least once
         for _ in 0..16 {
             if left <= 0.0 {
                 return;
             }
-            left -= self.regime(state, command, left, whole);
+            left -= self.regime(state, command, left);
         }
         // no time is lost where limits meet within rounding
         let end = self.linear(*state, command, left);
@@ -75,7 +91,7 @@ impl Servo {
     }
 
     /// Moves to the end of the regime or of `dt`, whichever comes first; the time it took.
-    fn regime(&self, state: &mut ServoState, command: f64, dt: f64, whole: &Transition) -> f64 {
+    fn regime(&self, state: &mut ServoState, command: f64, dt: f64) -> f64 {
         let [lowest, highest] = self.travel;
         let acceleration = self.acceleration(*state, command);
         let outward = if state.angle >= highest {
@@ -90,7 +106,7 @@ impl Servo {
             if outward * self.acceleration(*state, command) >= 0.0 {
                 return dt;
             }
-            return self.free(state, command, dt, whole);
+            return self.free(state, command, dt);
         }
         let limited = state.rate.abs() >= self.rate_limit && acceleration * state.rate >= 0.0;
         if limited {
@@ -105,25 +121,16 @@ impl Servo {
                 *state = ServoState { angle: stop, rate: 0.0 };
             } else if time >= leaves {
                 // on the other side of the limit by rounding, so that the free regime takes over
-                return time + self.free(state, command, dt - time, whole);
+                return time + self.free(state, command, dt - time);
             }
             return time;
         }
-        self.free(state, command, dt, whole)
+        self.free(state, command, dt)
     }
 
     /// The linear motion up to the first limit.
-    fn free(&self, state: &mut ServoState, command: f64, dt: f64, whole: &Transition) -> f64 {
+    fn free(&self, state: &mut ServoState, command: f64, dt: f64) -> f64 {
         let start = *state;
-        let end = if dt == whole.dt { whole.apply(start, command) } else { self.linear(start, command, dt) };
-        // quick: far from every limit
-        let (a0, a1) = (self.acceleration(start, command).abs(), self.acceleration(end, command).abs());
-        let fastest = start.rate.abs().max(end.rate.abs()) + a0.max(a1) * dt;
-        let room = |s: ServoState| (self.travel[1] - s.angle).min(s.angle - self.travel[0]);
-        if fastest < self.rate_limit && room(start).min(room(end)) > fastest * dt {
-            *state = end;
-            return dt;
-        }
         let at = |t: f64| self.linear(start, command, t);
         // where rate and angle turn, at most once each; between them both are monotone
         let mut knots = vec![0.0, dt];
@@ -153,7 +160,7 @@ impl Servo {
                 return t;
             }
         }
-        *state = end;
+        *state = at(dt);
         dt
     }
 
@@ -183,9 +190,17 @@ impl Servo {
     }
 }
 
+/// A time in equal parts, each with its linear motion.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Motion {
+    time: f64,
+    parts: u64,
+    part: Transition,
+}
+
 /// (δ − δc, v) after a time, a matrix by rows.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Transition {
+struct Transition {
     dt: f64,
     m: [[f64; 2]; 2],
 }

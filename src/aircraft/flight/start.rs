@@ -10,7 +10,7 @@ use super::earth::{Earth, Geodetic};
 use super::motion::State;
 use super::servo::Servo;
 use super::surfaces::CONTROLS;
-use super::vector::{Vector, back, from_euler, plus};
+use super::vector::{Vector, back, from_euler, matrix, plus};
 use crate::aircraft::airframe::trim::Trim;
 use crate::aircraft::airframe::{Actuator, Airplane, Propulsion};
 use crate::params::Measured;
@@ -77,6 +77,9 @@ pub(super) fn start(
     earth: Earth,
     wind: Vector,
 ) -> Result<Start, FlightError> {
+    if document.trim.is_none() && document.initial.is_none() {
+        return Err(FlightError("trim: missing; give a trim or an initial state to start from".into()));
+    }
     let si = |m: &Option<Measured>| m.as_ref().map(Measured::si);
     let of_earth = match &document.earth {
         EarthEntry::Flat => [None; 3],
@@ -95,6 +98,8 @@ pub(super) fn start(
         controls = Some([c.elevator, c.aileron, c.rudder, c.throttle]);
         velocity = plus(velocity, back(&from_euler(euler), wind));
     }
+    // an airplane that starts beside its trim is brought back to it
+    let trimmed = document.trim.as_ref().map(|_| (rate, [euler[0], euler[1]]));
     let mut place = [of_earth[0], of_earth[1]];
     if let Some(i) = &document.initial {
         let zero = |m: &Option<Measured>| si(m).unwrap_or(0.0);
@@ -113,10 +118,22 @@ pub(super) fn start(
             place[1].ok_or_else(|| missing("earth.wgs84.longitude"))?,
         ),
     };
-    if document.trim.is_none() && document.initial.is_none() {
-        return Err(FlightError("trim: missing; give a trim or an initial state to start from".into()));
-    }
-    let state = super::plan::state(earth, Geodetic { latitude, longitude, height }, euler, velocity, rate);
-    let reference = Reference { rate, angles: [euler[0], euler[1]], surfaces: [0.0; 3] };
+    let state = state_of(earth, Geodetic { latitude, longitude, height }, euler, velocity, rate);
+    let (rate, angles) = trimmed.unwrap_or((rate, [euler[0], euler[1]]));
+    let reference = Reference { rate, angles, surfaces: [0.0; 3] };
     Ok(Start { state, controls, reference, altitude: height })
+}
+
+/// A place and the attitude there as a state; `velocity` and `rate` in body axes, relative to the earth.
+fn state_of(earth: Earth, place: Geodetic, euler: Vector, velocity: Vector, rate: Vector) -> State {
+    let r = match earth {
+        Earth::Flat => [0.0, 0.0, -place.height],
+        Earth::Wgs84 => place.to_ecef(),
+    };
+    let attitude = earth.attitude(r, &from_euler(euler));
+    let c = matrix(attitude);
+    let inertial = plus(rate, earth.field(r, &c).rate);
+    let [a, b, d] = [r, velocity, inertial];
+    let e = attitude;
+    [a[0], a[1], a[2], b[0], b[1], b[2], e[0], e[1], e[2], e[3], d[0], d[1], d[2], 0.0]
 }

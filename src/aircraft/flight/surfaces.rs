@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::servo::{Servo, ServoState, Transition};
+use super::servo::{Motion, Servo, ServoState};
 use crate::aircraft::airframe::Controls;
 
 /// Elevator, aileron, rudder, throttle or thrust.
@@ -20,7 +20,7 @@ pub(super) struct Surface {
     command: f64,
     state: ServoState,
     /// Of the last step.
-    motion: Option<Transition>,
+    motion: Option<Motion>,
     /// When which command arrives.
     pending: VecDeque<(f64, f64)>,
 }
@@ -47,6 +47,7 @@ impl Surface {
         }
     }
 
+    #[inline(always)]
     fn advance(&mut self, dt: f64) {
         if let Some(servo) = &self.servo {
             servo.advance_again(&mut self.state, self.command, dt, &mut self.motion);
@@ -64,6 +65,7 @@ impl Surfaces {
         self.0.iter_mut().for_each(|surface| surface.receive(time));
     }
 
+    #[inline(always)]
     pub(super) fn advance(&mut self, dt: f64) {
         self.0.iter_mut().for_each(|surface| surface.advance(dt));
     }

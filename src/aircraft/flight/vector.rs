@@ -4,28 +4,34 @@ pub(super) type Vector = [f64; 3];
 /// Rows.
 pub(super) type Matrix = [[f64; 3]; 3];
 
+#[inline(always)]
 pub(super) fn plus(a: Vector, b: Vector) -> Vector {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
+#[inline(always)]
 pub(super) fn minus(a: Vector, b: Vector) -> Vector {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
+#[inline(always)]
 pub(super) fn cross(a: Vector, b: Vector) -> Vector {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
+#[inline(always)]
 pub(super) fn dot(a: Vector, b: Vector) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// C v.
+#[inline(always)]
 pub(super) fn times(c: &Matrix, v: Vector) -> Vector {
     [dot(c[0], v), dot(c[1], v), dot(c[2], v)]
 }
 
 /// Cᵀ v.
+#[inline(always)]
 pub(super) fn back(c: &Matrix, v: Vector) -> Vector {
     std::array::from_fn(|i| c[0][i] * v[0] + c[1][i] * v[1] + c[2][i] * v[2])
 }
@@ -40,6 +46,7 @@ pub(super) fn transpose(a: &Matrix) -> Matrix {
 }
 
 /// The matrix of a unit quaternion (scalar first) that turns body vectors into the other frame.
+#[inline(always)]
 pub(super) fn matrix(e: [f64; 4]) -> Matrix {
     let [e0, e1, e2, e3] = e;
     let (s0, s1, s2, s3) = (e0 * e0, e1 * e1, e2 * e2, e3 * e3);
@@ -66,7 +73,8 @@ pub(super) fn quaternion(c: &Matrix) -> [f64; 4] {
     }
 }
 
-/// Body to north-east-down from roll, pitch, yaw: turn by yaw about down, then by pitch about the new right, then by roll about the new forward axis.
+/// Body to north-east-down from roll, pitch, yaw: turn by yaw about down, then by pitch about the new right, then by
+/// roll about the new forward axis.
 pub(super) fn from_euler([phi, theta, psi]: Vector) -> Matrix {
     let ((sf, cf), (st, ct), (sp, cp)) = (phi.sin_cos(), theta.sin_cos(), psi.sin_cos());
     [

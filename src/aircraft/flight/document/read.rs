@@ -6,7 +6,8 @@ use serde_json::Value;
 
 use super::{
     AutopilotEntry, ControlsEntry, DriftEntry, EarthEntry, ErrorEntry, FORMAT, FlightDocument, GainsEntry, GnssEntry,
-    GustEntry, InitialEntry, Linked, PlaceEntry, SensorsEntry, TrimEntry, WindEntry,
+    GustEntry, InitialEntry, LateralWeights, Linked, LongitudinalWeights, LqrEntry, PlaceEntry, SensorsEntry,
+    TrimEntry, WindEntry,
 };
 use crate::aircraft::atmosphere::discrete::Form;
 use crate::aircraft::atmosphere::dryden::Specification;
@@ -31,12 +32,6 @@ fn required(object: &Object<'_>, key: &str, dimension: Dimension) -> Result<Meas
         ..error
     })?;
     Measured::from_place(&place, dimension, Range::Positive)
-}
-
-/// A plain number: 0.8 or "0.8".
-fn plain(place: &Place<'_>) -> Result<f64, KeyError> {
-    let text = place.value().as_str().and_then(|text| text.trim().parse::<f64>().ok()).filter(|x| x.is_finite());
-    text.map_or_else(|| place.number(), Ok)
 }
 
 fn linked(place: &Place<'_>) -> Result<Linked, KeyError> {
@@ -64,12 +59,11 @@ pub(super) fn flight(place: &Place<'_>) -> Result<FlightDocument, KeyError> {
         "initial",
         "controls",
         "earth",
+        "ground",
         "wind",
         "gusts",
         "sensors",
         "autopilot",
-        "feeds",
-        "criteria",
     ];
     let o = place.document(FORMAT, "flight.json", &known)?;
     let many = |place: Place<'_>| place.one_or_many()?.iter().map(gust).collect::<Result<Vec<_>, _>>();
@@ -80,12 +74,11 @@ pub(super) fn flight(place: &Place<'_>) -> Result<FlightDocument, KeyError> {
         initial: o.optional("initial").map(|p| initial(&p)).transpose()?,
         controls: o.optional("controls").map(|p| controls(&p)).transpose()?.unwrap_or_default(),
         earth: o.optional("earth").map(|p| earth(&p)).transpose()?.unwrap_or_default(),
+        ground: value(&o, "ground", LENGTH, Range::Any)?,
         wind: o.optional("wind").map(|p| wind(&p)).transpose()?,
         gusts: o.optional("gusts").map(many).transpose()?.unwrap_or_default(),
         sensors: o.optional("sensors").map(|p| sensors(&p)).transpose()?.unwrap_or_default(),
         autopilot: o.optional("autopilot").map(|p| autopilot(&p)).transpose()?,
-        feeds: o.optional("feeds").map(|p| p.value().clone()),
-        criteria: o.optional("criteria").map(|p| p.value().clone()),
     })
 }
 
@@ -138,7 +131,7 @@ fn controls(place: &Place<'_>) -> Result<ControlsEntry, KeyError> {
         elevator: angle("elevator")?,
         aileron: angle("aileron")?,
         rudder: angle("rudder")?,
-        throttle: throttle.as_ref().map(plain).transpose()?,
+        throttle: throttle.as_ref().map(Place::plain).transpose()?,
         thrust: value(&o, "thrust", Dimension::FORCE, Range::Any)?,
         file: o.optional("file").map(|p| p.text().map(PathBuf::from)).transpose()?,
     };
@@ -184,6 +177,7 @@ fn gust(place: &Place<'_>) -> Result<GustEntry, KeyError> {
         "specification",
         "wind_at_20ft",
         "std_dev",
+        "exceedance",
         "height",
         "airspeed",
         "form",
@@ -195,12 +189,18 @@ fn gust(place: &Place<'_>) -> Result<GustEntry, KeyError> {
     ];
     let model = word(&place.object(&known)?.required("model")?, &["dryden", "1-cos"])?;
     if model == "dryden" {
-        let o = place.object(&["model", "specification", "wind_at_20ft", "std_dev", "height", "airspeed"])?;
+        let o =
+            place.object(&["model", "specification", "wind_at_20ft", "std_dev", "exceedance", "height", "airspeed"])?;
         let named = o.required("specification")?;
         let specification = Specification::from_name(named.text()?)
             .ok_or_else(|| named.error(format!("known are {}", Specification::NAMES.join(", "))))?;
+        let exceedance = o.optional("exceedance");
+        if let (Some(_), Some(place)) = (o.optional("std_dev"), &exceedance) {
+            return Err(place.error("stands beside std_dev; give one of both"));
+        }
         return Ok(GustEntry::Dryden {
             specification,
+            exceedance: exceedance.as_ref().map(Place::plain).transpose()?,
             wind_at_20ft: value(&o, "wind_at_20ft", VELOCITY, Range::Positive)?,
             std_dev: value(&o, "std_dev", VELOCITY, Range::Positive)?,
             height: value(&o, "height", LENGTH, Range::Positive)?,
@@ -278,11 +278,16 @@ fn errors(place: &Place<'_>, dimension: Dimension) -> Result<ErrorEntry, KeyErro
 }
 
 fn autopilot(place: &Place<'_>) -> Result<AutopilotEntry, KeyError> {
-    let o = place.object(&["rate", "delay", "gains", "attitude_filter", "pitch", "bank"])?;
+    let o = place.object(&["rate", "delay", "gains", "lqr", "attitude_filter", "pitch", "bank"])?;
+    let (of_gains, of_lqr) = (o.optional("gains"), o.optional("lqr"));
+    if of_gains.is_some() == of_lqr.is_some() {
+        return Err(place.error("expected one of gains and lqr, by which the surfaces move"));
+    }
     Ok(AutopilotEntry {
         rate: required(&o, "rate", Dimension::FREQUENCY)?,
         delay: o.optional("delay").map(|p| samples(&p)).transpose()?.unwrap_or(1),
-        gains: gains(&o.required("gains")?)?,
+        gains: of_gains.map(|p| gains(&p)).transpose()?,
+        lqr: of_lqr.map(|p| lqr(&p)).transpose()?,
         attitude_filter: value(&o, "attitude_filter", Dimension::TIME, Range::Positive)?,
         pitch: value(&o, "pitch", ANGLE, Range::Any)?,
         bank: value(&o, "bank", ANGLE, Range::Any)?,
@@ -300,14 +305,46 @@ fn samples(place: &Place<'_>) -> Result<u64, KeyError> {
     })
 }
 
+fn lqr(place: &Place<'_>) -> Result<LqrEntry, KeyError> {
+    let o = place.object(&["longitudinal", "lateral"])?;
+    let along = o.required("longitudinal")?.object(&["states", "elevator"])?;
+    let across = o.required("lateral")?.object(&["states", "aileron", "rudder"])?;
+    Ok(LqrEntry {
+        longitudinal: LongitudinalWeights {
+            states: state_weights(&along, "u, w, q, theta")?,
+            elevator: input_weight(&along, "elevator")?,
+        },
+        lateral: LateralWeights {
+            states: state_weights(&across, "v, p, r, phi")?,
+            aileron: input_weight(&across, "aileron")?,
+            rudder: input_weight(&across, "rudder")?,
+        },
+    })
+}
+
+fn state_weights(object: &Object<'_>, names: &str) -> Result<[f64; 4], KeyError> {
+    let place = object.required("states")?;
+    let values = place.list()?.iter().map(Place::plain).collect::<Result<Vec<f64>, _>>()?;
+    <[f64; 4]>::try_from(values.as_slice())
+        .ok()
+        .filter(|values| values.iter().all(|x| *x >= 0.0))
+        .ok_or_else(|| place.error(format!("expected the weights of {names}: four numbers of zero or more")))
+}
+
+fn input_weight(object: &Object<'_>, key: &str) -> Result<f64, KeyError> {
+    let place = object.required(key)?;
+    let value = place.plain()?;
+    if value > 0.0 { Ok(value) } else { Err(place.error(format!("found {value}, expected more than zero"))) }
+}
+
 fn gains(place: &Place<'_>) -> Result<GainsEntry, KeyError> {
     let o = place.object(&["kq", "ktheta", "kp", "kphi", "kr", "washout"])?;
     let time = |key: &str| Measured::from_place(&o.required(key)?, Dimension::TIME, Range::Any);
     Ok(GainsEntry {
         kq: time("kq")?,
-        ktheta: plain(&o.required("ktheta")?)?,
+        ktheta: o.required("ktheta")?.plain()?,
         kp: time("kp")?,
-        kphi: plain(&o.required("kphi")?)?,
+        kphi: o.required("kphi")?.plain()?,
         kr: time("kr")?,
         washout: value(&o, "washout", Dimension::TIME, Range::Positive)?,
     })

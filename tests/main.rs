@@ -26,6 +26,7 @@ mod model;
 mod montecarlo;
 mod noise;
 mod numerics;
+mod ops;
 mod params;
 mod plants;
 mod progress;

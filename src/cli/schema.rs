@@ -14,7 +14,7 @@ use crate::filter::{AttitudeDesign, FilterDesign};
 use crate::identify::log_plan::LogPlan;
 use crate::input::inspect::Inventory;
 use crate::montecarlo;
-use crate::ops::{allan, identify, tune};
+use crate::ops::{allan, compare, identify, inflate, plan, replay, simulate, tune};
 use crate::params::Params;
 use crate::replay::ReplayResult;
 use crate::replay::attitude::AttitudeReplay;
@@ -73,6 +73,22 @@ enum Document {
     Inflate,
     /// What `montecarlo` and `merge` write
     Montecarlo,
+    /// What `allan` is asked for
+    AllanRequest,
+    /// What `identify` is asked for
+    IdentifyRequest,
+    /// What `plan` is asked for
+    PlanRequest,
+    /// What `compare` is asked for
+    CompareRequest,
+    /// What `inflate` is asked for
+    InflateRequest,
+    /// What `simulate` is asked for
+    SimulateRequest,
+    /// What `tune` is asked for
+    TuneRequest,
+    /// What `replay` is asked for
+    ReplayRequest,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
@@ -98,6 +114,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         Document::TuneAttitude => printed::<tune::attitude::Document<'_>>(),
         Document::Ranking => printed::<Ranking>(),
         Document::Replay => printed::<ReplayResult>(),
+        Document::AllanRequest => asked::<allan::Request>(),
+        Document::IdentifyRequest => asked::<identify::Request>(),
+        Document::PlanRequest => asked::<plan::Request>(),
+        Document::CompareRequest => asked::<compare::Request>(),
+        Document::InflateRequest => asked::<inflate::Request>(),
+        Document::SimulateRequest => asked::<simulate::Request>(),
+        Document::TuneRequest => asked::<tune::Request>(),
+        Document::ReplayRequest => asked::<replay::Request>(),
     })?;
     Ok(Status::Done)
 }
@@ -109,4 +133,9 @@ fn printed<T: schemars::JsonSchema>() -> serde_json::Value {
         .into_generator()
         .into_root_schema_for::<T>()
         .to_value()
+}
+
+/// The schema of what is read.
+fn asked<T: schemars::JsonSchema>() -> serde_json::Value {
+    schemars::schema_for!(T).to_value()
 }

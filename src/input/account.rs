@@ -24,6 +24,8 @@ const SPARE: u64 = 1 << 30;
 pub(super) const STEP: u64 = 64;
 /// Going to a place of the file.
 pub(super) const JUMP: u64 = 1024;
+/// Of a name that is no column's: in the list that is kept, in a note, and in what is printed.
+const NAMED: u64 = 3;
 /// A column in a list of columns, without its name, in the copies that a command makes of it.
 const COLUMN: u64 = 640;
 /// Of its name: as header, column, and in the list that `info` prints.
@@ -135,7 +137,7 @@ impl Account {
         if bytes > LONGEST_NAME {
             return Err(Excess::Name(bytes));
         }
-        self.hold(128 + bytes as u64)
+        self.hold(128 + NAMED * bytes as u64)
     }
 
     /// Columns with names of so many bytes each, or fewer.

@@ -9,7 +9,7 @@ fn main() -> ExitCode {
     let stop = Arc::new(Stop::default());
     #[cfg(unix)]
     signals::watch(Arc::clone(&stop));
-    cli::main(&stop)
+    ExitCode::from(cli::run(std::env::args_os(), &stop))
 }
 
 #[cfg(unix)]

@@ -446,7 +446,7 @@ fn each_rule_bites() {
         ("params.rs", "use crate::noise::Term;"),
         ("consistency/whiteness.rs", "use crate::filter::Kalman;"),
         ("cli/output.rs", "fn f() -> anyhow::Result<()> { std::io::stdout(); crate::view::plan::plan; }"),
-        ("main.rs", "fn main() { kfdesign::cli::main(); std::process::exit(1) }"),
+        ("main.rs", "fn main() { kfdesign::cli::run(args, stop); std::process::exit(1) }"),
     ] {
         assert_eq!(complaints(file, source), Vec::<String>::new(), "{source}");
     }

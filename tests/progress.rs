@@ -152,3 +152,19 @@ fn a_panic_is_no_stop() {
     // and nobody waits any more
     checkpoint();
 }
+
+/// A command line needs no process of its own.
+#[test]
+fn a_command_line_gives_its_status() {
+    let bench = Bench::new();
+    let stop = kfdesign::cli::Stop::default();
+    let run = |args: &[&str]| {
+        let words = ["kfdesign"].iter().chain(args).map(std::ffi::OsString::from).collect::<Vec<_>>();
+        kfdesign::cli::run(words, &stop)
+    };
+    let out = bench.path("log.npy").display().to_string();
+    let params = data("params.json").display().to_string();
+    assert_eq!(run(&["simulate", &params, "-o", &out, "--duration", "1min"]), 0);
+    assert_eq!(run(&["simulate", &params, "-o", &out, "--duration", "1parsec"]), 2);
+    assert_eq!(bench.files(), ["log.npy"]);
+}

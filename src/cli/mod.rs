@@ -26,7 +26,7 @@ mod stop;
 pub mod trim;
 pub mod tune;
 
-use std::process::ExitCode;
+use std::ffi::OsString;
 
 use clap::{Parser, Subcommand};
 
@@ -101,18 +101,19 @@ enum Command {
     Man(man::Args),
 }
 
-/// Parse the process arguments, run, map to the exit status.
-pub fn main(stop: &Stop) -> ExitCode {
-    let cli = match Cli::try_parse() {
+/// Runs a command line, whose first word is the name of the program, and gives its exit status. Signals are the caller's:
+/// see [`Stop`].
+pub fn run(args: impl IntoIterator<Item = OsString>, stop: &Stop) -> u8 {
+    let cli = match Cli::try_parse_from(args) {
         Ok(cli) => cli,
         Err(error) if error.use_stderr() => {
             say(&format!("kfdesign: {}", usage_error(&error)));
-            return ExitCode::from(2);
+            return 2;
         }
         Err(help) => {
             // help and version
             print_help(&help);
-            return ExitCode::from(exit_status(0));
+            return exit_status(0);
         }
     };
     find_threads();
@@ -139,14 +140,14 @@ pub fn main(stop: &Stop) -> ExitCode {
         Command::Man(args) => man::run(&args),
     };
     let result = output::watched(command).unwrap_or_else(|stopped| Err(stopped.into()));
-    ExitCode::from(exit_status(match result {
+    exit_status(match result {
         Ok(Status::Done) => 0,
         Ok(Status::CheckFailed) => 1,
         Err(error) => {
             say(&format!("kfdesign: {}", in_one_line(&error)));
             2
         }
-    }))
+    })
 }
 
 /// Where the machine gives no threads, for want of processes or of memory, this one does all the work. Rayon makes its threads at the first

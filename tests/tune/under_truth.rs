@@ -195,7 +195,7 @@ fn the_command_shows_the_design_under_a_truth() {
     let command = format!("tune {} --truth {} --runs 10", wrong.display(), truth.display());
     let printed = bench.ok(&format!("{command} --report page.html"));
     for part in [
-        "wrong/truth.json: root mean square error beside the sigma that the filter claims, exact, no simulation",
+        "wrong/truth.json: axis x\nRoot mean square error beside the sigma that the filter claims, exact, no simulation\n",
         "time (s)     bias  claimed  gauss_markov  claimed  whole drift (deg/s)  claimed    NEES",
         "Expected NEES per state; expected NIS 0.9996 over 351.8 s: both would be 1 if all were as claimed.",
         "pessimistic: the error of gauss_markov is 0.45",

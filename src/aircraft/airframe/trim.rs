@@ -159,7 +159,9 @@ impl Airplane {
         }
         let (x, r) = found;
         match too_slow {
-            Some(error) if r >= SOLVED => Err(error),
+            Some(error) if r >= SOLVED || self.aerodynamics.stall.is_some_and(|stall| x[0] >= stall.angle) => {
+                Err(error)
+            }
             _ => {
                 let drag = pressure * self.aerodynamics.lift_and_drag(&self.size, alpha, 0.0, 0.0).1;
                 self.judge(&x, r, drag + self.mass * g * request.climb.sin(), request, air.density)

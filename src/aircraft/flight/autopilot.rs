@@ -1,10 +1,10 @@
 //! Rate dampers and attitude loops, or the linear-quadratic regulator, and the complementary filter that gives them
 //! angles.
 //!
-//! δe = kq q̂ + kθ(θ̂ − θc), δa = −kp p̂ − kφ(φ̂ − φc), δr = +kr · washout(r̂), deviations from trim; washout τs/(τs +
-//! 1) by the bilinear rule. The angles are those of gyro and attitude reference: predicted by the gyro through the
-//! kinematics of roll and pitch, and corrected towards the reference with the time constant of the filter, 1 − e^(−Δ/τ)
-//! of the difference at each measurement.
+//! δe = kq q̂ + kθ(θ̂ − θc), δa = −kp p̂ − kφ(φ̂ − φc), δr = +kr · washout(r̂), deviations from trim; the washout
+//! τs/(1 + τs) by the bilinear rule. The angles are those of gyro and attitude reference: predicted by the gyro through
+//! the kinematics of roll and pitch, and corrected towards the reference with the time constant of the filter by
+//! 1 − e^(−Δ/τ) of the difference at each measurement.
 //!
 //! The regulator is δ = δ₀ − K (x − x₀) of the states u w q θ and v p r φ (`control::regulator`).
 

@@ -567,7 +567,7 @@ fn averages_and_lines_are_not_fitted_to_the_curve() {
     for (model, name) in [("white+ma", "ma"), ("white+gm+osc", "osc")] {
         let unit = Unit::parse("deg/s").unwrap();
         let error = identify_axis("x", &rate, 0.01, &unit, Method::Allan, &parse_model(model).unwrap()).unwrap_err();
-        let expected = format!("x: {name} needs --method likelihood");
+        let expected = format!("x: {name} needs `method` likelihood");
         assert!(error.to_string().starts_with(&expected), "{error}");
     }
 }

@@ -399,7 +399,7 @@ fn print_halves(label: &str, path: &str, flags: &'static str, [from, to]: [f64; 
             json(&run(&bench, "identify", &[path], &log, &all))
         };
         let mut found = identify(&[]);
-        let outliers = |axis: &Value| axis["warnings"].to_string().contains("--robust leaves them out");
+        let outliers = |axis: &Value| axis["warnings"].to_string().contains("`robust` leaves them out");
         if found["axes"].as_array().unwrap().iter().any(outliers) {
             found = identify(&["--robust"]);
         }

@@ -476,7 +476,7 @@ fn axes_are_matched_by_name_letter_or_order() {
     for unclear in [&["x", "y"][..], &["a", "b", "c", "d"], &["z", "a", "b"]] {
         let error = matched(unclear).unwrap_err();
         assert!(matches!(&error, ReplayError::Axes { .. }), "{unclear:?}");
-        assert!(error.to_string().contains(&unclear.join(", ")) && error.to_string().contains("--columns"));
+        assert!(error.to_string().contains(&unclear.join(", ")) && error.to_string().contains("`columns`"));
     }
     let single = design(vec![one("skydog")]);
     assert!(Replayer::new(&single, &shape(&["wx"], 1.0), Options::default()).is_ok());

@@ -125,7 +125,7 @@ fn the_inflated_parameters() {
     assert!((inflation(&again, &flight, FROM).unwrap().axes[0].factor - 1.0).abs() < 1e-3);
     let refused = inflation(&params(&[DRIFT]), &flight, FROM).unwrap_err().to_string();
     assert!(refused.contains("no white, moving_average or band_limit density"), "{refused}");
-    assert!(matches!(inflation(&bench, &flight, 5.0), Err(CompareError::Option { flag: "--from", .. })));
+    assert!(matches!(inflation(&bench, &flight, 5.0), Err(CompareError::Option { flag: "`from`", .. })));
     let few = inflation(&bench, &log(&loud, 400, 0), 4.0).unwrap_err().to_string();
     assert!(few.contains("80 spectral coefficients above 4.000 Hz") || few.contains("79 spectral"), "{few}");
 }

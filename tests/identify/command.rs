@@ -210,6 +210,7 @@ fn a_log_that_moves_is_a_failed_check_wherever_it_goes() {
     }
     let calm = params.source.as_ref().unwrap().checks[1].message.clone();
     let flags = calm.split("that ").nth(1).unwrap().split(" leaves").next().unwrap();
+    let flags = flags.replace("`start`", "--start").replace("`end`", "--end");
     let out = bench.run(&format!("identify log.csv --rate 100 {flags} -o calm.json"));
     assert_eq!(out.status, 0, "{flags}: {}", out.stderr);
     assert!(Params::read(&bench.path("calm.json")).unwrap().source.unwrap().checks.is_empty());

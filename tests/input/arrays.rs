@@ -92,7 +92,7 @@ fn what_is_meant_is_never_guessed() {
     assert!(refused(name, bytes, &[("unit", "deg/s")]).contains("time column 't' has no unit"));
     assert!(refused(name, bytes, &[("columns", "none_such")]).contains("no topic has the columns none_such; choose"));
     let npy = b"time (s),gyro_x (deg/s)\n0,1\n1,2\n";
-    assert!(refused("log.csv", npy, &[("topic", "gyr")]).contains("--topic gyr: this is text with one table"));
+    assert!(refused("log.csv", npy, &[("topic", "gyr")]).contains("`topic` gyr: this is text with one table"));
 }
 
 #[test]

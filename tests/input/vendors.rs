@@ -101,11 +101,11 @@ fn exports_are_read_by_their_headers() {
         assert_eq!(said, by);
     }
     // the unit is asked for first, then what the stamps are
-    assert!(refused(&export(xsens, '\t', 1.0), &[]).contains("no unit for column 'Gyr_X'; say it with --unit"));
+    assert!(refused(&export(xsens, '\t', 1.0), &[]).contains("no unit for column 'Gyr_X'; say it with `unit`"));
     let message = refused(&export(xsens, '\t', 1.0), &[("unit", "rad/s")]);
     assert!(
         message.contains("'SampleTimeFine' has no unit")
-            && message.ends_with("100 Hz that the file says with --time none"),
+            && message.ends_with("100 Hz that the file says with `time` none"),
         "{message}"
     );
 }

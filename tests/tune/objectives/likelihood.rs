@@ -172,11 +172,11 @@ fn held_out_rows_are_foretold_from_those_before() {
 #[test]
 fn what_the_likelihood_cannot_do_is_refused() {
     let none = request(Objective::Likelihood);
-    assert!(refused(&at_rest(), &none).contains("needs a log: --log LOG"));
+    assert!(refused(&at_rest(), &none).contains("needs a log: `log` LOG"));
     let long = sensor(10.0, vec![white(0.1), gauss_markov(0.05, 200.0)], Some(0.5));
     let logs = log(vec![log_at_rest()]);
     let short = Request { logs: &logs, ..none };
     let message = refused(&long, &short);
-    assert!(message.contains("300.0 s") && message.contains("--hold gauss_markov.correlation_time"), "{message}");
-    assert!(refused(&at_rest(), &Request { held_out: 1.5, ..short }).contains("--held-out is 1.5"));
+    assert!(message.contains("300.0 s") && message.contains("`hold` gauss_markov.correlation_time"), "{message}");
+    assert!(refused(&at_rest(), &Request { held_out: 1.5, ..short }).contains("`held_out` is 1.5"));
 }

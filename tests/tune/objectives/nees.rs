@@ -56,11 +56,11 @@ fn what_is_right_does_not_move_and_what_moves_moves_least() {
 #[test]
 fn a_truth_is_needed_that_the_filter_can_follow() {
     let params = sensor(10.0, vec![white(0.05), gauss_markov(0.03, 200.0)], Some(0.5));
-    assert!(refused(&params, &request(Objective::Nees)).contains("--truth PARAMS"));
+    assert!(refused(&params, &request(Objective::Nees)).contains("`truth` PARAMS"));
     let walk = sensor(10.0, vec![white(0.05), gauss_markov(0.03, 200.0), random_walk(1e-3)], Some(0.5));
     let message = refused(&params, &Request { truth: Some(&walk), ..request(Objective::Nees) });
     assert!(message.contains("grows without bound"), "{message}");
     let still = sensor(10.0, vec![white(0.05)], Some(0.5));
     let message = refused(&still, &Request { truth: Some(&still), ..request(Objective::Nees) });
-    assert!(message.contains("--objective nees: axis x: nothing drifts"), "{message}");
+    assert!(message.contains("`objective` nees: axis x: nothing drifts"), "{message}");
 }

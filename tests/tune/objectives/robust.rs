@@ -110,7 +110,7 @@ fn what_cannot_be_robust_is_refused() {
     let hold = ["gauss".to_string()];
     let message = refused(&uncertain(), &Request { hold: &hold, ..request(Objective::Robust) });
     assert!(
-        message.contains("--hold gauss: there is no such parameter; there are gauss_markov.correlation_time"),
+        message.contains("`hold` gauss: there is no such parameter; there are gauss_markov.correlation_time"),
         "{message}"
     );
     let all = ["white".to_string(), "gauss_markov".to_string()];

@@ -113,9 +113,11 @@ pub struct Candidate {
 pub struct Precision {
     /// `gauss_markov.std_dev`.
     pub parameter: String,
-    /// Standard deviation from the curvature of the likelihood.
+    /// Standard deviation from the curvature of the likelihood; null where it says nothing, and of a parameter that is held.
+    #[schemars(with = "Option<f64>")]
     pub std_dev_percent: f64,
     /// Cramér-Rao bound: no unbiased estimate from a log like this has a smaller standard deviation.
+    #[schemars(with = "Option<f64>")]
     pub cramer_rao_percent: f64,
 }
 

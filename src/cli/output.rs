@@ -20,7 +20,7 @@ static LOST: OnceLock<String> = OnceLock::new();
 pub fn print_json<T: Serialize>(value: &T) -> anyhow::Result<()> {
     let mut text = serde_json::to_string_pretty(value)?;
     text.push('\n');
-    print(&text);
+    print_text(&text);
     Ok(())
 }
 
@@ -55,12 +55,8 @@ pub fn with_flags(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// Text on stdout. Nothing here changes what the work has found: see [`exit_status`].
+/// Text on stdout, as it is. Nothing here changes what the work has found: see [`exit_status`].
 pub fn print_text(text: &str) {
-    print(&with_flags(text));
-}
-
-fn print(text: &str) {
     let mut out = std::io::stdout().lock();
     let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
     if let Err(error) = written
@@ -74,7 +70,7 @@ fn print(text: &str) {
 /// A report for a person: as wide as the terminal, with every column and whole lines where stdout is none.
 pub fn print_report(report: &Report<'_>) {
     let width = terminal_size::terminal_size_of(std::io::stdout()).map(|(width, _)| usize::from(width.0));
-    print_text(&terminal::text(report, Level::Full, width));
+    print_text(&with_flags(&terminal::text(report, Level::Full, width)));
 }
 
 /// A line on stderr. Who does not listen misses it.

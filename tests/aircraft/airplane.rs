@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::super::support::{Bench, data};
+use crate::support::{Bench, data};
 
 fn document(name: &str) -> Value {
     serde_json::from_str(&std::fs::read_to_string(data(&format!("airplanes/{name}.json"))).unwrap()).unwrap()

@@ -10,7 +10,7 @@ use kfdesign::aircraft::control::document::Linearized;
 use kfdesign::aircraft::control::regulator::regulator;
 use nalgebra::{DMatrix, DVector};
 
-use super::super::support::data;
+use crate::support::data;
 
 fn aerosonde() -> Airplane {
     Airplane::read(&data("airplanes/aerosonde.json")).unwrap()

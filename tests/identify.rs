@@ -493,7 +493,7 @@ fn what_cannot_be_identified_is_refused_with_what_to_do() {
     assert!(said(&[0.5; 1000], &auto).starts_with("gyro_x: constant (0.5000 in SI units, 1000 samples)"));
     let mut hole = log(&[white(1.0)], 100, 0.01, 1, 0);
     hole[40] = f64::NAN;
-    assert_eq!(said(&hole, &auto), "gyro_x: sample 40 is not finite: cut the log with --start/--end");
+    assert_eq!(said(&hole, &auto), "gyro_x: sample 40 is not finite: cut the log with `start`/`end`");
     let small = log(&[white(1.0)], 30, 0.01, 1, 0);
     let many = parse_model("white+gm+gm+rrw+ramp+flicker+quantization").unwrap();
     let error = said(&small, &many);

@@ -348,9 +348,13 @@ pub fn accepts(schema: &Value, root: &Value, value: &Value) -> Result<(), String
                 value.as_object().into_iter().flatten().try_for_each(inner)?;
                 true
             }
-            "additionalProperties" => value
-                .as_object()
-                .is_none_or(|map| rule == true || map.keys().all(|k| schema["properties"].get(k).is_some())),
+            "additionalProperties" => {
+                let more = |(key, _): &(&String, &Value)| schema["properties"].get(key).is_none();
+                value.as_object().into_iter().flatten().filter(more).all(|(_, value)| match rule {
+                    Value::Bool(allowed) => *allowed,
+                    rule => accepts(rule, root, value).is_ok(),
+                })
+            }
             other => return Err(format!("the test does not know the keyword {other}")),
         };
         if !fits {

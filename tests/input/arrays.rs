@@ -85,7 +85,7 @@ fn what_is_meant_is_never_guessed() {
     let message = refused(name, bytes, &[("time", "none")]);
     assert_eq!(
         message,
-        format!("{name}: the header gives no unit for column 'gyr_x'; say it with --unit, for example --unit deg/s")
+        format!("{name}: the header gives no unit for column 'gyr_x'; say it with `unit`, for example `unit` deg/s")
     );
     let message = refused(name, bytes, &[("topic", "nix")]);
     assert!(message.starts_with(&format!("{name}: no topic 'nix'; there are gyr (40 rows: gyr_x gyr_y gyr_z accT_x")));

@@ -1,6 +1,8 @@
 //! How long after a stop is asked for the work has ended: two hours of a gyro at 100 Hz, stopped at thirty moments of
 //! each command's work. Prints a table; docs/performance.md has it.
 
+#![allow(clippy::print_stdout)] // a table is all it makes
+
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -118,11 +120,11 @@ fn main() {
             verify(&design, &plan).expect("a verdict");
         }),
     ];
-    eprintln!("{:<34}{:>10}{:>12}{:>12}", "", "whole s", "median ms", "longest ms");
+    println!("{:<34}{:>10}{:>12}{:>12}", "", "whole s", "median ms", "longest ms");
     for (name, work) in works {
         let (whole, times) = stopped(work);
         let ms = |time: Option<&Duration>| time.map_or(f64::NAN, |t| 1e3 * t.as_secs_f64());
-        eprintln!(
+        println!(
             "{name:<34}{:>10.2}{:>12.2}{:>12.2}",
             whole.as_secs_f64(),
             ms(times.get(times.len() / 2)),

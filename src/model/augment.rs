@@ -17,7 +17,7 @@ pub struct InitialBias {
 }
 
 /// Errors of a sensor of one axis at rest: z_k = bias + Σ h_i x_i + w_k, states "bias" and those of every noise process, in the fixed
-/// order of [`Kind`](crate::noise::Kind), block-diagonal F, Q, P0, each block discretised exactly by its process; R = (Σ N²)/dt.
+/// order of [`Kind`], block-diagonal F, Q, P0, each block discretised exactly by its process; R = (Σ N²)/dt.
 ///
 /// `dt` in s; `horizon_s` is the slowest time constant that flicker must cover. `bias` is the constant part; without it there is
 /// no "bias" state. State names are unique: "gauss_markov", "gauss_markov.2". P0 of a process is that of its realisation.

@@ -192,7 +192,9 @@ fn whole(request: &Request, grid: TauGrid, options: &LogOptions) -> anyhow::Resu
         advance(1);
         axis
     };
-    Ok((header, parts.into_par_iter().map(curve).collect::<anyhow::Result<_>>()?))
+    // of several errors that of the first axis
+    let axes: Vec<anyhow::Result<AxisCurve>> = parts.into_par_iter().map(curve).collect();
+    Ok((header, axes.into_iter().collect::<anyhow::Result<_>>()?))
 }
 
 fn axis_curve(stretch: Stretch, dt: f64, kind: Deviation, grid: TauGrid) -> anyhow::Result<AxisCurve> {

@@ -317,7 +317,8 @@ fn whole(
     }
     let temperature = temperature::Temperature::new(&readings, options.kind);
     begin("identify", parts.len() as u64);
-    let axes: Vec<IdentifiedAxis> = parts
+    // of several errors that of the first axis
+    let axes: Vec<anyhow::Result<IdentifiedAxis>> = parts
         .into_par_iter()
         .map(|part| {
             let holds = holds_of(holds, &part[0].name, &names);
@@ -325,7 +326,8 @@ fn whole(
             advance(1);
             axis
         })
-        .collect::<anyhow::Result<_>>()?;
+        .collect();
+    let axes: Vec<IdentifiedAxis> = axes.into_iter().collect::<anyhow::Result<_>>()?;
     for AxisCurve { name, note: used, .. } in axes.iter().map(|axis| &axis.measured) {
         if let Some(used) = used {
             note(&format!("  note: {name}: {used}"));

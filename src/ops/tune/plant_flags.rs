@@ -21,6 +21,7 @@ pub struct PlantFlags {
     /// What the sensor is part of: static, angle, rate, vertical, attitude, or a design FILE.json [default: the design of the parameters, else static]
     #[arg(long, value_name = "PLANT")]
     pub plant: Option<String>,
+    #[allow(rustdoc::broken_intra_doc_links, reason = "it is the help of a flag, too")]
     /// A measurement of the plant: "[NAME:] SIGMA [@ RATE] [, SIGMA over TIME]", for example "heading: 2 deg @ 1 Hz, 1 deg over 60 s"; or
     /// its column in the logs, as in replay: heading=yaw:deg
     #[arg(long, value_name = "AID")]

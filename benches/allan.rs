@@ -42,7 +42,8 @@ fn ours(rate: &[f64], factors: &[u64]) -> Vec<f64> {
     estimates.iter().map(|estimate| estimate.variance.sqrt()).collect()
 }
 
-/// The grid of the side-by-side with other programs: 100 factors equally spaced in their logarithm up to a tenth of the log, distinct.
+/// The grid of the side-by-side with other programs: 100 factors equally spaced in their logarithm up to a tenth of
+/// the log, distinct.
 fn peers_factors(samples: usize) -> Vec<u64> {
     let top = (samples as f64 / 10.0).floor().log2();
     let mut factors: Vec<u64> = (0..100).map(|i| (top * f64::from(i) / 99.0).exp2().round() as u64).collect();
@@ -50,7 +51,8 @@ fn peers_factors(samples: usize) -> Vec<u64> {
     factors
 }
 
-/// On the data of the side-by-side, where KFDESIGN_BENCH_DATA names its folder: the best of seven, as of the others; one line per file, the largest last.
+/// On the data of the side-by-side, where KFDESIGN_BENCH_DATA names its folder: the best of seven, as of the others;
+/// one line per file, the largest last.
 #[allow(clippy::print_stdout, reason = "the line is read by a script")]
 fn peers(_: &mut Criterion) {
     let Some(folder) = std::env::var_os("KFDESIGN_BENCH_DATA") else { return };

@@ -1,6 +1,6 @@
-//! One row of the attitude filter (prediction, force towards east and north, heading) against the same sizes with nalgebra's dynamic
-//! matrices: P ← F P Fᵀ + Q with a full F, three scalar updates P ← P − K (h P). And a linear error-state filter of twelve states with
-//! two measurements, ours (structure of F found once) against the same.
+//! One row of the attitude filter (prediction, force towards east and north, heading) against the same sizes with
+//! nalgebra's dynamic matrices: P ← F P Fᵀ + Q with a full F, three scalar updates P ← P − K (h P). And a linear
+//! error-state filter of twelve states with two measurements, ours (structure of F found once) against the same.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -70,7 +70,8 @@ fn by_the_book(f: &DMatrix<f64>, q: &DMatrix<f64>, h: &DMatrix<f64>, r: f64, ste
     p[(0, 0)] + x[0]
 }
 
-/// Attitude errors, gyro biases, gyro drifts and body accelerations about three axes; the two horizontal forces are measured.
+/// Attitude errors, gyro biases, gyro drifts and body accelerations about three axes; the two horizontal forces are
+/// measured.
 fn twelve_states() -> LinearModel {
     let (n, dt) = (12, 0.01);
     let named = |name: String| Named { name, unit: "rad".into() };

@@ -1,7 +1,7 @@
-//! A log through the reference sensor's filter: whole, with settled gains; whole, carrying the covariance; and one call per predict and
-//! update (sizes known at run time, gate included); against the same equations written by hand with statically sized nalgebra matrices on
-//! the same data. And the exact expectation of a mismatched filter. `KFDESIGN_BENCH_DATA` names a folder with `rate_1e6.f64` and
-//! `angle_1e6.f64` (see `peers.py`) to run on as well.
+//! A log through the reference sensor's filter: whole, with settled gains; whole, carrying the covariance; and one
+//! call per predict and update (sizes known at run time, gate included); against the same equations written by hand
+//! with statically sized nalgebra matrices on the same data. And the exact expectation of a mismatched filter.
+//! `KFDESIGN_BENCH_DATA` names a folder with `rate_1e6.f64` and `angle_1e6.f64` (see `peers.py`) to run on as well.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -18,7 +18,8 @@ use kfdesign::units::Quantity;
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 const STEPS: usize = 100_000;
-/// Steps timed at once, short enough to fall between the interruptions of a busy machine; the best of all rounds counts.
+/// Steps timed at once, short enough to fall between the interruptions of a busy machine; the best of all rounds
+/// counts.
 const ROUND: usize = 500;
 
 /// Bias and `drifts` Gauss-Markov drifts in white noise at 100 Hz, SI.

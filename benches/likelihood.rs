@@ -1,8 +1,10 @@
-//! Maximum likelihood of white noise and one Gauss-Markov process: ours, from samples in memory to everything `identify` gives (estimates,
-//! intervals, the Allan curve beside them), against the same estimates by hand, and its cost by number of samples.
+//! Maximum likelihood of white noise and one Gauss-Markov process: ours, from samples in memory to everything
+//! `identify` gives (estimates, intervals, the Allan curve beside them), against the same estimates by hand, and its
+//! cost by number of samples.
 //!
-//! By hand: mean taken off, scalar filter whose gain is kept once it has settled, BFGS on logarithms with central differences, one thread. With
-//! KFDESIGN_BENCH_DATA=FOLDER also on `rate_1e6.f64` there (deg/s, 100 Hz, raw little-endian f64).
+//! By hand: mean taken off, scalar filter whose gain is kept once it has settled, BFGS on logarithms with central
+//! differences, one thread. With KFDESIGN_BENCH_DATA=FOLDER also on `rate_1e6.f64` there (deg/s, 100 Hz, raw
+//! little-endian f64).
 #![allow(clippy::print_stdout, reason = "figures are what the bench is for")]
 
 use std::path::Path;

@@ -1,6 +1,6 @@
-//! 1000 runs of 10,000 steps of the two-state static design, one axis, with NEES at 100 epochs, NIS, autocorrelation and block sums, and
-//! the same with NEES and NIS averaged at every step; against the textbook loop (every run propagates its own covariance, matrices of fixed
-//! size, NEES and NIS at every step) and the random numbers alone.
+//! 1000 runs of 10,000 steps of the two-state static design, one axis, with NEES at 100 epochs, NIS, autocorrelation
+//! and block sums, and the same with NEES and NIS averaged at every step; against the textbook loop (every run
+//! propagates its own covariance, matrices of fixed size, NEES and NIS at every step) and the random numbers alone.
 
 use std::hint::black_box;
 use std::time::Instant;

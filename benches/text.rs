@@ -1,5 +1,5 @@
-//! Reading a text log of a time and three axes, with the log check, against a plain reader on the same file: the csv parser line by line,
-//! every field by the standard library.
+//! Reading a text log of a time and three axes, with the log check, against a plain reader on the same file: the csv
+//! parser line by line, every field by the standard library.
 //!
 //! `KFDESIGN_BENCH_GROWTH=1` prints seconds over 10⁴ to 10⁷ rows.
 

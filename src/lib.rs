@@ -1,15 +1,15 @@
 //! Kalman-filter design workbench for inertial sensors.
 //!
-//! A gyro or accelerometer log at rest goes in; noise parameters with intervals, a filter that estimates the bias drift, and a
-//! proof that the covariance of the filter tells the truth come out:
+//! A gyro or accelerometer log at rest goes in; noise parameters with intervals, a filter that estimates the bias
+//! drift, and a proof that the covariance of the filter tells the truth come out:
 //!
 //! ```text
 //! log ─ input ─> Recording ─ identify ─> Params ─ tune ─> FilterDesign ─ replay ─────> verdict on a log
 //!                                                                      └ montecarlo ─> verdict on simulated runs
 //! ```
 //!
-//! The sensor gives `g = r + b + b_r(t) + w`: true rate, constant bias, bias drift (Gauss-Markov processes, random walk,
-//! flicker) and wideband noise. The `kfdesign` command is a thin layer on this library.
+//! The sensor gives `g = r + b + b_r(t) + w`: true rate, constant bias, bias drift (Gauss-Markov processes, random
+//! walk, flicker) and wideband noise. The `kfdesign` command is a thin layer on this library.
 //!
 //! # A filter, and whether it is honest
 //!

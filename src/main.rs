@@ -26,8 +26,9 @@ mod signals {
     /// The thread does next to nothing.
     const STACK: usize = 1 << 17;
 
-    /// At Ctrl-C or SIGTERM, work that keeps what it has done stops at its next checkpoint; other work, and any at the second time, ends as the
-    /// signal says, but without temporary files. Where no thread can be made, signals do what they do.
+    /// At Ctrl-C or SIGTERM, work that keeps what it has done stops at its next checkpoint; other work, and any at
+    /// the second time, ends as the signal says, but without temporary files. Where no thread can be made, signals
+    /// do what they do.
     pub(super) fn watch(stop: Arc<Stop>) {
         let (ready, watching) = mpsc::channel();
         let watch = move || {

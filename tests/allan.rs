@@ -73,8 +73,9 @@ fn path(model: &NoiseModel, dt: f64, n: usize, seed: u64, run: u64) -> Vec<f64> 
 mod published {
     use super::*;
 
-    /// Table 31 of NIST SP 1065, m = 1, 10, 100: every printed digit. HDEV without overlap is from Riley's "The calculation
-    /// of time domain frequency stability", table III, whose last value is cut, not rounded (3.910860e-2 for 0.0391086056).
+    /// Table 31 of NIST SP 1065, m = 1, 10, 100: every printed digit. HDEV without overlap is from Riley's "The
+    /// calculation of time domain frequency stability", table III, whose last value is cut, not rounded (3.910860e-2
+    /// for 0.0391086056).
     #[test]
     fn nist_1000_points() {
         let table: [(Deviation, [&str; 3]); 6] = [
@@ -93,8 +94,8 @@ mod published {
         }
     }
 
-    /// Table 32 (overlapping ADEV, m = 10): 981 terms, white, and 146.177 degrees of freedom by the classical formula, which
-    /// the exact value must meet within 1 % (formulas.md: 0.03 % at n = 2000).
+    /// Table 32 (overlapping ADEV, m = 10): 981 terms, white, and 146.177 degrees of freedom by the classical
+    /// formula, which the exact value must meet within 1 % (formulas.md: 0.03 % at n = 2000).
     #[test]
     fn nist_1000_points_confidence() {
         let curve = allan::curve(&nist(), 1.0, Deviation::Oadev, TauGrid::Decade).unwrap();

@@ -1,4 +1,5 @@
-//! The attitude filter: error definitions, motion through gimbal lock, consistency on simulated motion, outliers, BROAD trials.
+//! The attitude filter: error definitions, motion through gimbal lock, consistency on simulated motion, outliers,
+//! BROAD trials.
 
 use kfdesign::filter::attitude::{AttitudeDesign, Heading, Mekf, Row};
 use kfdesign::numerics::distribution::chi_square_quantile;
@@ -95,8 +96,9 @@ fn loops_through_gimbal_lock_leave_nothing_behind() {
     assert!(mekf.covariance().symmetric_eigenvalues().min() > 0.0);
 }
 
-/// Motion drawn from the filter's own model (the witnesses switched off, so that there is one model): the inclination errors of 40 runs at
-/// their end have the claimed covariance. Bounds of 1e-6 each side: false alarm 2e-6, and 1e-6 for the heading.
+/// Motion drawn from the filter's own model (the witnesses switched off, so that there is one model): the
+/// inclination errors of 40 runs at their end have the claimed covariance. Bounds of 1e-6 each side: false alarm
+/// 2e-6, and 1e-6 for the heading.
 #[test]
 fn errors_have_the_claimed_covariance() {
     const RUNS: u64 = 40;
@@ -202,8 +204,8 @@ fn outliers_are_weighted_down() {
     assert!(hit.total_rmse_deg < 3.0 && hit.covered > 0.95, "{} deg, {}", hit.total_rmse_deg, hit.covered);
 }
 
-/// Total error in degrees of VQF 2.1.2 (defaults), the best of VQF, Madgwick and Mahony (ahrs 0.4.0) on each of these trials;
-/// benches/attitude_peers.py measures it.
+/// Total error in degrees of VQF 2.1.2 (defaults), the best of VQF, Madgwick and Mahony (ahrs 0.4.0) on each of
+/// these trials; benches/attitude_peers.py measures it.
 const TRIALS: [(&str, f64); 4] = [
     ("02_undisturbed_slow_rotation_B.hdf5", 1.382),
     ("05_undisturbed_slow_rotation_with_breaks_B.hdf5", 0.986),
@@ -235,7 +237,8 @@ fn broad_trials_are_better_than_the_best_peer() {
                 let number = |key: &str| result["errors"][key].as_f64().unwrap();
                 assert!(number("total_rmse_deg") <= best, "{trial}: {} deg", number("total_rmse_deg"));
                 assert!(number("covered") >= 0.95, "{trial}: {}", number("covered"));
-                // the mean rate of a rest is its drift, if the body is still; 0.01 deg/s is what moves in the rests of these trials
+                // the mean rate of a rest is its drift, if the body is still; 0.01 deg/s is what moves in the rests
+                // of these trials
                 for rest in result["rests"].as_array().unwrap() {
                     let length = rest["end_s"].as_f64().unwrap() - rest["start_s"].as_f64().unwrap();
                     for axis in (0..3).filter(|_| length > 20.0) {

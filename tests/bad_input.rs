@@ -316,7 +316,8 @@ fn parameters_beyond_the_limits() {
         row("long drift", "190 s", "1e300 s", &["correlation_time: ", "larger than any sensor's", sizes]),
         row("small drift", "0.028 deg/s", "1e-160 deg/s", &["std_dev: ", "smaller than any sensor's", sizes]),
     ]);
-    // the advice is true: the density that it names makes a filter that its own verification passes; so do as many terms as may be
+    // the advice is true: the density that it names makes a filter that its own verification passes; so do as many
+    // terms as may be
     let bench = Bench::new();
     bench.file("params.json", params("0.0562 deg/s/sqrt(Hz)", "2.8e-10 deg/s/sqrt(Hz)"));
     let said = bench.run("tune params.json").stdout;
@@ -329,7 +330,8 @@ fn parameters_beyond_the_limits() {
     bench.ok("tune many.json --runs 8");
 }
 
-/// One sample that no sensor gives is named and left out; of a log of them nothing is left. No sum overflows, and nothing that was not judged passes.
+/// One sample that no sensor gives is named and left out; of a log of them nothing is left. No sum overflows, and
+/// nothing that was not judged passes.
 #[test]
 fn values_that_overflow_are_named() {
     let bench = Bench::new();

@@ -1,4 +1,5 @@
-//! Filters as C and Rust: they compile without a warning, their self-tests pass, and they are our replay on measured logs.
+//! Filters as C and Rust: they compile without a warning, their self-tests pass, and they are our replay on measured
+//! logs.
 
 mod drive;
 
@@ -12,7 +13,8 @@ use serde_json::{Value, json};
 use crate::support::{Bench, data, measured};
 use drive::{Case, Limits, Toolchain, compare, replayed};
 
-/// A gyro like that of the measured log: a turn-on bias fifty times the noise of one sample. The axes y and z have the same numbers, x has a line.
+/// A gyro like that of the measured log: a turn-on bias fifty times the noise of one sample. The axes y and z have
+/// the same numbers, x has a line.
 const GYRO: &str = r#"{"format": "kfdesign-params/1", "quantity": "angular-rate", "sample_rate": "99.4 Hz", "axes": [
     {"name": "x", "turn_on_bias": {"std_dev": "5 deg/s"}, "white": {"density": "0.012 deg/s/sqrt(Hz)"},
      "gauss_markov": {"std_dev": "0.005 deg/s", "correlation_time": "100 s"},
@@ -69,8 +71,9 @@ fn export(bench: &Bench, language: &str, name: &str, filter: &str, precision: &s
     bench.ok(&format!("export {filter} --to {language} --precision {precision} --form {form} -o {name}.{extension}"));
 }
 
-/// The line that the command prints builds and runs the self-test, and a program in C++ links with the files as C and finds the self-test in the
-/// header: without `extern "C"` its names are others. Each language is skipped, with a line, where its compiler is not.
+/// The line that the command prints builds and runs the self-test, and a program in C++ links with the files as C
+/// and finds the self-test in the header: without `extern "C"` its names are others. Each language is skipped, with
+/// a line, where its compiler is not.
 #[test]
 fn the_printed_line_runs_the_self_test_and_cpp_links() {
     let bench = Bench::new();
@@ -170,8 +173,8 @@ impl InLine for str {
     }
 }
 
-/// Generated code against replay: a measured log with rows that are missing and values that are no numbers, through a sensor at rest and through a
-/// plant with an input and an aid.
+/// Generated code against replay: a measured log with rows that are missing and values that are no numbers, through
+/// a sensor at rest and through a plant with an input and an aid.
 #[test]
 fn generated_code_is_replay_on_measured_logs() {
     let Some(path) = measured(LOG) else { return };
@@ -220,7 +223,8 @@ fn generated_code_is_replay_on_measured_logs() {
     }
 }
 
-/// `start` is the update of x0, P0 by the mean of n samples: P0 hᵀ (mean − h x0)/(h P0 hᵀ + R/n), in both languages to rounding.
+/// `start` is the update of x0, P0 by the mean of n samples: P0 hᵀ (mean − h x0)/(h P0 hᵀ + R/n), in both languages
+/// to rounding.
 #[test]
 fn constant_gains_start_from_a_mean() {
     let bench = Bench::new();

@@ -98,9 +98,9 @@ fn failed(found: &Comparison) -> Vec<&str> {
     found.tests.iter().filter(|t| !t.pass()).map(|t| t.name.as_str()).collect()
 }
 
-/// 30 logs of their own model: each is rejected in 1.3 % at most (docs/validation.md), so six or more of them with probability
-/// below 4e-6; halves of the p-values lie below ½, so that fewer than 3 or more than 27 do with 9e-7 for each test (and more than 0.55 or less
-/// than 0.45 of them would not change that by a factor of 4).
+/// 30 logs of their own model: each is rejected in 1.3 % at most (docs/validation.md), so six or more of them with
+/// probability below 4e-6; halves of the p-values lie below ½, so that fewer than 3 or more than 27 do with 9e-7 for
+/// each test (and more than 0.55 or less than 0.45 of them would not change that by a factor of 4).
 #[test]
 fn true_models_are_kept() {
     let model = [WHITE, drift(0.05)];
@@ -113,8 +113,9 @@ fn true_models_are_kept() {
     }
 }
 
-/// White noise 1.3 times the model's: the Allan deviation is 1.3 times the model's, the power 1.69 times. 20 000 samples: the standard
-/// deviation of the Allan ratio at 0.1 s is 0.7 %, of the power in the highest band (6666 coefficients) 1.7 %, of NIS 1 %; five of each.
+/// White noise 1.3 times the model's: the Allan deviation is 1.3 times the model's, the power 1.69 times. 20 000
+/// samples: the standard deviation of the Allan ratio at 0.1 s is 0.7 %, of the power in the highest band (6666
+/// coefficients) 1.7 %, of NIS 1 %; five of each.
 #[test]
 fn louder_noise_is_measured() {
     let found = compared(&[WHITE], &[Term::White { density: 0.13 }], 20_000, 0);
@@ -129,8 +130,9 @@ fn louder_noise_is_measured() {
     assert!(effect.interval[0] < 1.3 && 1.3 < effect.interval[1], "{effect:?}");
 }
 
-/// Drift three times the model's or a third of it: the slow end of the curve and of the spectrum shows it and says the direction, while NIS
-/// is blind to it. The ratio of variances is 9 where drift dominates: many tens of sigmas of a band of 8 coefficients or more.
+/// Drift three times the model's or a third of it: the slow end of the curve and of the spectrum shows it and says
+/// the direction, while NIS is blind to it. The ratio of variances is 9 where drift dominates: many tens of sigmas
+/// of a band of 8 coefficients or more.
 #[test]
 fn wrong_drift_is_found_both_ways() {
     for (factor, word) in [(3.0, "more noise"), (1.0 / 3.0, "less noise")] {
@@ -156,8 +158,8 @@ fn a_line_is_placed() {
     assert_eq!(compared(&[WHITE, line], &[WHITE, line], 20_000, 2).verdict, Verdict::Consistent);
 }
 
-/// A known ramp is taken off the spectrum and belongs to the curve; without it in the model both see it (R τ/√2 is ten times the white noise at
-/// 600 s).
+/// A known ramp is taken off the spectrum and belongs to the curve; without it in the model both see it (R τ/√2 is
+/// ten times the white noise at 600 s).
 #[test]
 fn a_ramp_is_part_of_the_model() {
     let ramp = Term::RateRamp { slope: 1e-4 };
@@ -166,8 +168,8 @@ fn a_ramp_is_part_of_the_model() {
     assert!(!test(&found, "allan_curve").pass() && !test(&found, "spectrum_ratio").pass(), "{:?}", failed(&found));
 }
 
-/// The reference sensor for one hour: N²/T + 2σ²Tc/T·(1 − (Tc/T)(1 − e^(−T/Tc))) with N = 0.0562, σ = 0.0280596, Tc = 193.9312 gives
-/// 0.0090075 deg/s (the leading term alone 0.0092: the published one).
+/// The reference sensor for one hour: N²/T + 2σ²Tc/T·(1 − (Tc/T)(1 − e^(−T/Tc))) with N = 0.0562, σ = 0.0280596, Tc =
+/// 193.9312 gives 0.0090075 deg/s (the leading term alone 0.0092: the published one).
 #[test]
 fn the_mean_of_a_log_strays_by_what_is_said() {
     let params = Params::read(&crate::support::data("params.json")).unwrap();
@@ -199,7 +201,8 @@ fn another_rate_is_said() {
     assert!(found.axes[0].notes[0].contains("moving_average over 3 samples belongs to the samples"));
 }
 
-/// A log of 20 s shows nothing of a drift of 200 s: no failure, and no consent either. A length that is enough is said, and is.
+/// A log of 20 s shows nothing of a drift of 200 s: no failure, and no consent either. A length that is enough is
+/// said, and is.
 #[test]
 fn a_short_log_decides_nothing_about_drift() {
     let model = [WHITE, Term::GaussMarkov { std_dev: 0.02, correlation_time: 200.0 }];

@@ -1,4 +1,5 @@
-//! Consistency statistics against closed forms, scipy and statsmodels, and their measured sizes under the null hypothesis.
+//! Consistency statistics against closed forms, scipy and statsmodels, and their measured sizes under the null
+//! hypothesis.
 
 use approx::assert_relative_eq;
 use kfdesign::consistency::TestKind;
@@ -55,9 +56,10 @@ fn anees_bounds_are_chi_square() {
 
 /// The two usual rules for the NEES of a perfect filter: sum it over time, or count the times outside a 95 % band.
 ///
-/// The error has one state and the pole of the reference sensor's drift filter, 100 Hz, 600 s. Formula: the sum over n epochs has the
-/// variance of n_eff of them, so it leaves its 95 % bounds with probability 2 Φ(−1.96 √(n_eff/n)) = 96.5 %. Counting: independent
-/// simulation gave 45 %. False alarm: 400 experiments each, bounds at 4.5 standard deviations (3.7 % and 11 %), 1e-5.
+/// The error has one state and the pole of the reference sensor's drift filter, 100 Hz, 600 s. Formula: the sum over
+/// n epochs has the variance of n_eff of them, so it leaves its 95 % bounds with probability 2 Φ(−1.96 √(n_eff/n)) =
+/// 96.5 %. Counting: independent simulation gave 45 %. False alarm: 400 experiments each, bounds at 4.5 standard
+/// deviations (3.7 % and 11 %), 1e-5.
 #[test]
 fn usual_rules_reject_perfect_filters() {
     let (pole, steps, experiments) = (0.99949048_f64, 60_000, 400);
@@ -114,7 +116,8 @@ fn mean_tests_are_two_sided() {
     assert_eq!(mean_of_chi_squares(80.0, 40, 2.0, 0.01).tendency(), "as predicted");
 }
 
-/// Direct sum n/(1 + 2 Σ (1 − h/n) ρ^h), evaluated in Python; ρ = λ² of the reference set, at 10 min, 1 h, 10 h of 100 Hz.
+/// Direct sum n/(1 + 2 Σ (1 − h/n) ρ^h), evaluated in Python; ρ = λ² of the reference set, at 10 min, 1 h, 10 h of
+/// 100 Hz.
 #[test]
 fn effective_sample_size_of_correlated_nees() {
     let rho = 0.9994904814605_f64.powi(2);
@@ -207,7 +210,8 @@ fn autocorrelation_over_missing_samples() {
     }
 }
 
-/// scipy 1.17.1: kstest of the cumulative periodogram against the uniform law (exact p-values for 198 points; its sign is that of the straight line less ours).
+/// scipy 1.17.1: kstest of the cumulative periodogram against the uniform law (exact p-values for 198 points; its
+/// sign is that of the straight line less ours).
 #[test]
 fn cumulative_periodogram_is_a_kolmogorov_test() {
     let result = cumulative_periodogram(&series(), 0.05).unwrap();
@@ -342,10 +346,11 @@ fn verdict_weighs_significance_and_size() {
     assert_eq!(judge(&mut [test_with(0.02, None)], 0.01), Verdict::Consistent);
 }
 
-/// Sizes under the null hypothesis: white noise, 2000 samples, 3000 runs, each test at alpha = 0.05. Each rejection count is
-/// binomial(3000, 0.05) for an exact test; the bounds are 4.9 standard deviations (1e-6 two-sided) plus, for the asymptotic ones
-/// (largest lag, Ljung-Box), 0.006 for the error of the approximation. Five tests: false-alarm probability below 1e-5.
-/// With 2000 samples, a filter of 80 samples time constant and no more than 20 lags.
+/// Sizes under the null hypothesis: white noise, 2000 samples, 3000 runs, each test at alpha = 0.05. Each rejection
+/// count is binomial(3000, 0.05) for an exact test; the bounds are 4.9 standard deviations (1e-6 two-sided) plus,
+/// for the asymptotic ones (largest lag, Ljung-Box), 0.006 for the error of the approximation. Five tests:
+/// false-alarm probability below 1e-5. With 2000 samples, a filter of 80 samples time constant and no more than 20
+/// lags.
 #[test]
 fn sizes_under_the_null_hypothesis() {
     let (runs, alpha) = (3000, 0.05);
@@ -380,7 +385,8 @@ fn sizes_under_the_null_hypothesis() {
     assert!(size < alpha + spread && size > 0.5 * alpha, "family-wise size {size}");
 }
 
-/// The block test rejects with 90 % probability at its stated `detects` ratios: 2000 runs, 4.9 standard deviations (1e-6).
+/// The block test rejects with 90 % probability at its stated `detects` ratios: 2000 runs, 4.9 standard deviations
+/// (1e-6).
 #[test]
 fn stated_power_is_reached() {
     let (blocks, runs) = (40, 2000);
@@ -401,8 +407,8 @@ fn stated_power_is_reached() {
     }
 }
 
-/// Largest |autocorrelation| of an AR(1) series: the simultaneous interval holds the true value φ in at least 95 % of 400 runs
-/// (bound: 4.9 standard deviations below 0.95, 1e-6), and the share that the past predicts, φ², is met.
+/// Largest |autocorrelation| of an AR(1) series: the simultaneous interval holds the true value φ in at least 95 %
+/// of 400 runs (bound: 4.9 standard deviations below 0.95, 1e-6), and the share that the past predicts, φ², is met.
 #[test]
 fn interval_of_the_largest_autocorrelation_covers() {
     let phi = 0.5_f64;
@@ -418,11 +424,13 @@ fn interval_of_the_largest_autocorrelation_covers() {
         assert!(effect.is_beyond());
     }
     assert!(f64::from(covered) >= 400.0 * 0.95 - 4.9 * (400.0 * 0.95 * 0.05_f64).sqrt(), "covered {covered}");
-    // mean of 400 values whose spread is about 0.025: 0.01 is eight standard errors, with room for the bias of order 1/n
+    // mean of 400 values whose spread is about 0.025: 0.01 is eight standard errors, with room for the bias of order
+    // 1/n
     assert!((share - phi * phi).abs() < 0.01, "{share}");
 }
 
-/// AR(1) with φ = 0.1: the interval of the predictable share, φ², covers it in 95 % of 400 runs (± 4.9 standard deviations, 1e-6).
+/// AR(1) with φ = 0.1: the interval of the predictable share, φ², covers it in 95 % of 400 runs (± 4.9 standard
+/// deviations, 1e-6).
 #[test]
 fn interval_of_the_predictable_share_covers() {
     let phi = 0.1_f64;

@@ -1,5 +1,5 @@
-//! The files of docs/cluster and docs/ci are run, so that they cannot rot: the Kubernetes containers' scripts, and the CI files' commands.
-//! Slurm's scripts are checked on a real Slurm by `.ci/slurm`.
+//! The files of docs/cluster and docs/ci are run, so that they cannot rot: the Kubernetes containers' scripts, and
+//! the CI files' commands. Slurm's scripts are checked on a real Slurm by `.ci/slurm`.
 
 use std::path::Path;
 use std::process::Command;
@@ -111,7 +111,8 @@ fn the_package_is_clean() {
     }
 }
 
-/// docs/third-party-licences.md names every package that is linked into the program, in its version, and none that Cargo.lock has not.
+/// docs/third-party-licences.md names every package that is linked into the program, in its version, and none that
+/// Cargo.lock has not.
 #[test]
 fn third_party_licences_are_those_of_the_lock_file() {
     let page = doc("third-party-licences.md");

@@ -1,11 +1,11 @@
-//! Documentation cannot rot: every `sh` block of README.md and docs/*.md is run, and where a `text` block follows, it must
-//! be what the commands print on stdout.
+//! Documentation cannot rot: every `sh` block of README.md and docs/*.md is run, and where a `text` block follows,
+//! it must be what the commands print on stdout.
 //!
-//! Blocks of one page run in order in one scratch directory that holds a copy of `data/`. `cargo run --release -- ARGS`
-//! runs the binary under test; other `cargo` and `git` lines are set-up and are not run. A line may end in `# exit 1`.
-//! A picture `![words](figures/NAME.svg "REPORT.html, TITLE")` is the figure TITLE of a report or of a
-//! sheet of figures (FIGURES.svg) that the commands of the page wrote.
-//! `KFDESIGN_UPDATE_DOCS=1 cargo test --release docs` rewrites the `text` blocks from what was printed, and the pictures.
+//! Blocks of one page run in order in one scratch directory that holds a copy of `data/`. `cargo run --release --
+//! ARGS` runs the binary under test; other `cargo` and `git` lines are set-up and are not run. A line may end in `#
+//! exit 1`. A picture `![words](figures/NAME.svg "REPORT.html, TITLE")` is the figure TITLE of a report or of a
+//! sheet of figures (FIGURES.svg) that the commands of the page wrote. `KFDESIGN_UPDATE_DOCS=1 cargo test --release
+//! docs` rewrites the `text` blocks from what was printed, and the pictures.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,5 @@
-//! Parameter files of other programs: field by field, and through each consumer's own discretisation back to the parameters.
+//! Parameter files of other programs: field by field, and through each consumer's own discretisation back to the
+//! parameters.
 
 mod walks;
 
@@ -151,7 +152,8 @@ fn every_field_is_what_the_consumer_takes() {
     assert!(refused.status == 2 && refused.stderr.contains("rate random walk"), "{}", refused.stderr);
 }
 
-/// A sensor stream as a consumer's own code makes it: white noise of deviation `white` per sample, a bias b⁺ = φ b + `step` n.
+/// A sensor stream as a consumer's own code makes it: white noise of deviation `white` per sample, a bias b⁺ = φ b +
+/// `step` n.
 fn consumer(white: f64, phi: f64, step: f64, run: u64) -> Vec<f64> {
     let mut rng = stream(77, StreamId { run, axis: 0, term: 0 });
     // two correlation times away from a start at zero
@@ -179,9 +181,9 @@ fn ln_estimates(axis: &AxisParams) -> Vec<(String, f64, f64)> {
         .collect()
 }
 
-/// Every consumer's file, simulated with that consumer's own discretisation for 4000 s, gives the parameters back: N and the walk K (or N, σ and Tc)
-/// within five standard deviations of their estimates (6e-7 each; the estimates are normal in their logarithms to some 0.2 sd here, which five sd
-/// leave room for: 1e-5 for the whole test).
+/// Every consumer's file, simulated with that consumer's own discretisation for 4000 s, gives the parameters back: N
+/// and the walk K (or N, σ and Tc) within five standard deviations of their estimates (6e-7 each; the estimates are
+/// normal in their logarithms to some 0.2 sd here, which five sd leave room for: 1e-5 for the whole test).
 #[test]
 fn the_consumers_own_formulas_give_the_parameters_back() {
     let bench = bench();
@@ -301,8 +303,9 @@ fn the_consumers_own_formulas_give_the_parameters_back() {
     }
 }
 
-/// Noise behind a low-pass: white noise of 0.01 and an oscillation of 3 Hz that dies away in 0.05 s. N is what the mean over a long time shows:
-/// σ²(mean over T)·T by the autocovariance, here in closed form as the sum over all lags, 1e-9 of it beyond the last that is taken.
+/// Noise behind a low-pass: white noise of 0.01 and an oscillation of 3 Hz that dies away in 0.05 s. N is what the
+/// mean over a long time shows: σ²(mean over T)·T by the autocovariance, here in closed form as the sum over all
+/// lags, 1e-9 of it beyond the last that is taken.
 #[test]
 fn density_at_low_frequencies() {
     let (sigma, f0, time, dt) = (0.2_f64, 3.0_f64, 0.05_f64, 0.01_f64);
@@ -326,7 +329,8 @@ fn density_at_low_frequencies() {
     assert!(found.stderr.contains(&said) && found.stdout.contains(&said), "{said}: {}", found.stderr);
 }
 
-/// N of a band limit keeps its interval beside the floor that a filter needs, a hundredth of it at most; beside white noise that counts there is none.
+/// N of a band limit keeps its interval beside the floor that a filter needs, a hundredth of it at most; beside
+/// white noise that counts there is none.
 #[test]
 fn a_band_limit_gives_n_with_its_interval() {
     let bench = bench();

@@ -226,8 +226,8 @@ fn z_scores(found: &Identified, truth: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|i| (estimate[i] - truth[i].ln()) / ((intervals[i][1] / intervals[i][0]).ln() / (2.0 * 1.96)))
 }
 
-/// Eight logs of 2 h (the reference sensor averaged to 0.57 Hz). Each |z| < 6 (normal: 2e-9 each; the tails are heavier, as
-/// the study shows), the mean of the eight within 4.9/√8 (1e-6).
+/// Eight logs of 2 h (the reference sensor averaged to 0.57 Hz). Each |z| < 6 (normal: 2e-9 each; the tails are
+/// heavier, as the study shows), the mean of the eight within 4.9/√8 (1e-6).
 #[test]
 fn reference_sensor_is_recovered_within_its_intervals() {
     let (samples, forced) = (4096, parse_model("white+gm").unwrap());
@@ -259,8 +259,8 @@ fn times_chosen(terms: &[Term], span_s: f64, wanted: &str) -> usize {
     (0..8).filter(chosen).count()
 }
 
-/// The study finds the right model in 98.5 % of white, 94 % of white + Gauss-Markov and 93 % of white + random walk logs: fewer
-/// than the counts asked for here happen with probability 3e-6, 3e-6 and 6e-6.
+/// The study finds the right model in 98.5 % of white, 94 % of white + Gauss-Markov and 93 % of white + random walk
+/// logs: fewer than the counts asked for here happen with probability 3e-6, 3e-6 and 6e-6.
 #[test]
 fn terms_are_chosen_and_not_assumed() {
     assert!(times_chosen(&[white(N)], 7200.0, "White") >= 5);
@@ -288,8 +288,8 @@ fn ramp_keeps_its_sign() {
 // What a log cannot tell
 // ---------------------------------------------------------------------------------------------------------------
 
-/// One minute of a sensor with a correlation time of three minutes: no log of this kind may name it. The study names it in none
-/// of 1000 such logs; with this seed the outcome is what it is.
+/// One minute of a sensor with a correlation time of three minutes: no log of this kind may name it. The study names
+/// it in none of 1000 such logs; with this seed the outcome is what it is.
 #[test]
 fn short_log_says_what_it_cannot_tell() {
     let rate = log(&[white(N), gauss_markov(SIGMA, TC)], 6000, 0.01, 4, 0);
@@ -304,7 +304,8 @@ fn short_log_says_what_it_cannot_tell() {
     assert!(time.needed_log_s.is_none_or(|s| s > 60.0), "{time:?}");
 }
 
-/// From white noise alone: an upper limit of the random walk, above what the 2 h log could hide and below what it could not.
+/// From white noise alone: an upper limit of the random walk, above what the 2 h log could hide and below what it
+/// could not.
 #[test]
 fn white_log_bounds_the_random_walk() {
     let found = identify(&log(&[white(N)], 4096, 1.76, 6, 0), 1.76, &ModelChoice::Auto);
@@ -321,8 +322,8 @@ fn white_log_bounds_the_random_walk() {
     assert_eq!(number.unit.dimension(), Quantity::AngularRate.dimension().times_time(-1));
 }
 
-/// The log length that would tell scales as the square of the interval: at twice the length the sentence must not ask for more
-/// than about what it asked for before.
+/// The log length that would tell scales as the square of the interval: at twice the length the sentence must not
+/// ask for more than about what it asked for before.
 #[test]
 fn precision_is_said_with_the_length_that_would_sharpen_it() {
     let found =
@@ -334,7 +335,8 @@ fn precision_is_said_with_the_length_that_would_sharpen_it() {
     assert!((hours / expected - 1.0).abs() < 1e-3, "{sentence}, {expected}");
 }
 
-/// One log of the reference sensor in about two thousand has a p-value below 10⁻³ by chance (here 6.6e-4): nothing is left out for that, and N is known as in any other log.
+/// One log of the reference sensor in about two thousand has a p-value below 10⁻³ by chance (here 6.6e-4): nothing
+/// is left out for that, and N is known as in any other log.
 #[test]
 fn a_poor_fit_by_chance_leaves_no_short_averages_out() {
     let rate = log(&[white(N), gauss_markov(SIGMA, TC)], 7200, 1.0, 35, 253);
@@ -345,8 +347,9 @@ fn a_poor_fit_by_chance_leaves_no_short_averages_out() {
     assert!((found.model.white_density() / N).ln().abs() < 4.5 * 0.0086, "{}", found.model.white_density());
 }
 
-/// A sensor whose samples are averaged in pairs (lag-one correlation 1/2): the shortest averaging times are left out, and the
-/// density stays right. |z| < 4.5, of one that is a quarter of its standard deviation low, and the p-value as above.
+/// A sensor whose samples are averaged in pairs (lag-one correlation 1/2): the shortest averaging times are left
+/// out, and the density stays right. |z| < 4.5, of one that is a quarter of its standard deviation low, and the
+/// p-value as above.
 #[test]
 fn band_limited_log_loses_its_shortest_averaging_times_only() {
     let raw = log(&[white(N)], 200_001, 0.01, 7, 0);
@@ -362,8 +365,10 @@ fn band_limited_log_loses_its_shortest_averaging_times_only() {
     assert!(upper / lower < 1.1);
 }
 
-/// 24 logs behind a filter (half of them means of two, half a low-pass of order 2 at a tenth of the rate), by the curve and by its wavelets: the 95 % interval of N
-/// holds the truth in at least 17. If it covers 92 %, fewer come with a probability of 3e-5. Without a margin beyond the time where the filter is seen, it is none of 24 by the curve.
+/// 24 logs behind a filter (half of them means of two, half a low-pass of order 2 at a tenth of the rate), by the
+/// curve and by its wavelets: the 95 % interval of N holds the truth in at least 17. If it covers 92 %, fewer come
+/// with a probability of 3e-5. Without a margin beyond the time where the filter is seen, it is none of 24 by the
+/// curve.
 #[test]
 fn density_behind_a_filter_is_in_its_interval() {
     // scipy.signal.butter(2, 0.2)
@@ -398,8 +403,9 @@ fn graphical(rate: &[f64], dt: f64) -> Identified {
     identify_axis("x", rate, dt, &Unit::parse("deg/s").unwrap(), Method::Graphical, &ModelChoice::Auto).unwrap()
 }
 
-/// Thirty hours of the reference sensor: after its maximum the curve falls below its first minimum again, also with slope −1/2. The maximum is read all
-/// the same (its τ scatters by some 17 %, within a factor of 2: 5e-5 by a normal law of the logarithm), and N before the minimum (0.2 %, bound 5 %).
+/// Thirty hours of the reference sensor: after its maximum the curve falls below its first minimum again, also with
+/// slope −1/2. The maximum is read all the same (its τ scatters by some 17 %, within a factor of 2: 5e-5 by a normal
+/// law of the logarithm), and N before the minimum (0.2 %, bound 5 %).
 #[test]
 fn recipe_reads_the_maximum_of_a_long_log() {
     let unit = Unit::parse("deg/s").unwrap();
@@ -411,8 +417,9 @@ fn recipe_reads_the_maximum_of_a_long_log() {
     assert!((0.5..2.0).contains(&(time / TC)), "{time}");
 }
 
-/// Two hours of the reference sensor at 100 Hz, values in deg/s. The smoothed log has variance σ² + N²/(100 dt): the recipe's
-/// σ_GM is √(σ² + N²)/σ = 2.24 times too large. Its scatter is 2.5 % (of σ² 23 %), the bounds are 5 sigmas: 6e-7.
+/// Two hours of the reference sensor at 100 Hz, values in deg/s. The smoothed log has variance σ² + N²/(100 dt): the
+/// recipe's σ_GM is √(σ² + N²)/σ = 2.24 times too large. Its scatter is 2.5 % (of σ² 23 %), the bounds are 5 sigmas:
+/// 6e-7.
 #[test]
 fn recipe_is_faithful_and_says_what_it_costs() {
     let unit = Unit::parse("deg/s").unwrap();
@@ -467,8 +474,8 @@ fn worked_example() {
     close((0.02806_f64.powi(2) + 0.0562_f64.powi(2)).sqrt(), 0.0628, 5e-5);
 }
 
-/// White noise has no minimum and no maximum: the recipe reads N and nothing else. With 100 000 samples the curve can still
-/// wiggle at its end; with this seed it does not.
+/// White noise has no minimum and no maximum: the recipe reads N and nothing else. With 100 000 samples the curve
+/// can still wiggle at its end; with this seed it does not.
 #[test]
 fn recipe_fills_in_nothing() {
     let found = graphical(&log(&[white(1e-3)], 100_000, 0.01, 9, 0), 0.01);
@@ -502,8 +509,8 @@ fn what_cannot_be_identified_is_refused_with_what_to_do() {
     assert!(identify_axis("x", &small, 0.01, &unit, Method::Graphical, &auto).is_ok());
 }
 
-/// Logs that are legal and odd: two values, one step, one spike, a pure ramp, an alternation. Anything but a panic or a value
-/// that is not finite.
+/// Logs that are legal and odd: two values, one step, one spike, a pure ramp, an alternation. Anything but a panic
+/// or a value that is not finite.
 #[test]
 fn odd_logs_are_survived() {
     let noise = log(&[white(1.0)], 500, 0.01, 1, 0);

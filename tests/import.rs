@@ -29,7 +29,8 @@ rostopic:                    /imu0      #the IMU ROS topic
 update_rate:                 100.0
 "#;
 
-/// As gaowenliang/imu_utils writes the reference sensor at 400 Hz: N √400, and 0.013114 deg/s, the lowest point of its Allan deviation.
+/// As gaowenliang/imu_utils writes the reference sensor at 400 Hz: N √400, and 0.013114 deg/s, the lowest point of
+/// its Allan deviation.
 const DEVIATIONS: &str = r#"%YAML:1.0
 ---
 type: IMU
@@ -55,7 +56,8 @@ Acc:
       acc_w: 6.32492e-04
 "#;
 
-/// Written by an early gaowenliang/imu_utils for a DJI A3 at 400 Hz (its data/A3_imu_param.yaml, first digits): N/20 would lie below the floor.
+/// Written by an early gaowenliang/imu_utils for a DJI A3 at 400 Hz (its data/A3_imu_param.yaml, first digits): N/20
+/// would lie below the floor.
 const EARLY: &str = r#"%YAML:1.0
 ---
 type: IMU
@@ -387,8 +389,9 @@ fn log(n: f64, sigma: f64, tc: f64, samples: usize, run: u64) -> Vec<f64> {
     (0..samples).map(|_| one()).collect()
 }
 
-/// Growth of the drift over short times and white noise as a whole: of 40 logs of two hours at 1 Hz the standard deviation of ln K is that of the information
-/// matrix (0.090, and 0.0086 for N), and the 95 % intervals cover: fewer than 32 of 40 have probability 1e-4, each time.
+/// Growth of the drift over short times and white noise as a whole: of 40 logs of two hours at 1 Hz the standard
+/// deviation of ln K is that of the information matrix (0.090, and 0.0086 for N), and the 95 % intervals cover:
+/// fewer than 32 of 40 have probability 1e-4, each time.
 #[test]
 fn sums_of_processes_have_honest_intervals() {
     use rayon::prelude::*;
@@ -416,8 +419,9 @@ fn sums_of_processes_have_honest_intervals() {
     }
 }
 
-/// A process that forgets within three samples counts as white noise: its spectrum at zero is σ²(1 + a)/(1 − a) dt. Twenty logs of 20,000 samples: all
-/// within five standard deviations (1e-5), and their mean square of the expected size (χ² of 20 outside 8 … 45: 1e-3).
+/// A process that forgets within three samples counts as white noise: its spectrum at zero is σ²(1 + a)/(1 − a) dt.
+/// Twenty logs of 20,000 samples: all within five standard deviations (1e-5), and their mean square of the expected
+/// size (χ² of 20 outside 8 … 45: 1e-3).
 #[test]
 fn fast_processes_are_white_noise() {
     use rayon::prelude::*;

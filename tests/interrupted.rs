@@ -24,7 +24,8 @@ fn signalled(bench: &Bench, args: &str, signal: i32, pause: Duration) -> std::pr
     status
 }
 
-/// At twenty moments each. Whatever the moment, the process ends as the signal says or has done its work; there is no file but whole ones.
+/// At twenty moments each. Whatever the moment, the process ends as the signal says or has done its work; there is
+/// no file but whole ones.
 #[test]
 fn no_unfinished_file_is_left_by_a_signal() {
     let bench = Bench::new();

@@ -1,11 +1,13 @@
-//! The whole chain (identify, tune, replay) on measured logs: skipped with a printed line where the logs are not, see `support::measured`.
+//! The whole chain (identify, tune, replay) on measured logs: skipped with a printed line where the logs are not,
+//! see `support::measured`.
 
 use serde_json::Value;
 
 use crate::support::{Bench, Outcome, measured};
 
-/// One sensor of one measured log: how it is read, and the white density its Allan deviation at 1 s shows (log unit), per axis,
-/// computed independently from the raw numbers (see the data's own page); zero where none is stated.
+/// One sensor of one measured log: how it is read, and the white density its Allan deviation at 1 s shows (log
+/// unit), per axis, computed independently from the raw numbers (see the data's own page); zero where none is
+/// stated.
 struct Log {
     label: &'static str,
     path: &'static str,
@@ -158,8 +160,8 @@ fn the_chain_says_something_true_of_every_measured_log() {
         assert_eq!(axes.len(), 3, "{}", log.label);
         for (axis, expected) in axes.iter().zip(log.white) {
             let value = wideband(axis);
-            // the Allan deviation at 1 s carries some drift and flicker beside the white noise, and a sampling error of up to 10 %
-            // in a log of a minute; a wrong unit or a factor of √2 is far outside
+            // the Allan deviation at 1 s carries some drift and flicker beside the white noise, and a sampling error
+            // of up to 10 % in a log of a minute; a wrong unit or a factor of √2 is far outside
             assert!(
                 expected == 0.0 || (value / expected - 0.95).abs() < 0.25,
                 "{}: wideband density {value}, Allan deviation at 1 s {expected}",
@@ -299,7 +301,8 @@ fn sensors(file: &str) -> Vec<(&'static str, &'static str)> {
     }
 }
 
-/// The flags that the check of a moving log names leave a part that is at rest by the page of the data, which says whole seconds, and half a minute or more of it.
+/// The flags that the check of a moving log names leave a part that is at rest by the page of the data, which says
+/// whole seconds, and half a minute or more of it.
 #[test]
 fn the_calmest_part_of_a_moving_log_is_one_of_its_rests() {
     let rests: [&[[f64; 2]]; 7] = [
@@ -339,11 +342,13 @@ fn the_calmest_part_of_a_moving_log_is_one_of_its_rests() {
     }
 }
 
-/// Axes that keep the bounds on the innovations: at 5 % and at 1 % for each, and at 1 % for all; as designed, followed, by their own parameters.
+/// Axes that keep the bounds on the innovations: at 5 % and at 1 % for each, and at 1 % for all; as designed,
+/// followed, by their own parameters.
 type Kept = [[usize; 3]; 3];
 
-/// Parameters from one half of each log, innovations of the other: `cargo test --release -- --ignored --nocapture table_of_halves` prints the table of
-/// docs/validation.md. Outliers are left out where the command says that there are some.
+/// Parameters from one half of each log, innovations of the other: `cargo test --release -- --ignored --nocapture
+/// table_of_halves` prints the table of docs/validation.md. Outliers are left out where the command says that there
+/// are some.
 #[test]
 #[ignore = "prints a table for docs/validation.md"]
 fn table_of_halves() {

@@ -1,4 +1,5 @@
-//! `kfdesign montecarlo` and `kfdesign merge`: the same document however its runs were come by, refusals, truths, closed forms.
+//! `kfdesign montecarlo` and `kfdesign merge`: the same document however its runs were come by, refusals, truths,
+//! closed forms.
 
 mod closed_forms;
 mod every_step;
@@ -36,8 +37,8 @@ fn two_axes() -> String {
     params.to_string()
 }
 
-/// A drift that the filter learns in 1068 s. Runs are twice as long if no length is given; shorter ones are judged as far as they go, and say
-/// what they leave out; the 600 s of others stay theirs.
+/// A drift that the filter learns in 1068 s. Runs are twice as long if no length is given; shorter ones are judged
+/// as far as they go, and say what they leave out; the 600 s of others stay theirs.
 #[test]
 fn runs_are_as_long_as_the_design_needs() {
     let slow = SMALL.replace("5 s", "3000 s").replace("0.05 deg/s\"", "0.01 deg/s\"");

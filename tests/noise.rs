@@ -318,7 +318,8 @@ mod second_difference {
 mod realisation {
     use super::*;
 
-    /// E z²/(2 m² dt²) of the samples h x_k, by propagating the covariance: the Allan variance of the state-space model.
+    /// E z²/(2 m² dt²) of the samples h x_k, by propagating the covariance: the Allan variance of the state-space
+    /// model.
     fn allan_variance(term: Term, m: usize, horizon_s: f64) -> f64 {
         let r = term.realisation(DT, horizon_s).unwrap();
         let mut p = r.p0.clone();
@@ -442,8 +443,8 @@ mod sample_path {
         }
     }
 
-    /// Means of y_0 y_k over 20 000 independent paths against σ²φ^k: standard error σ² √((1 + φ^{2k})/20000), 5 of them.
-    /// False alarm 5.7e-7 for each of four lags; the first is the stationary start.
+    /// Means of y_0 y_k over 20 000 independent paths against σ²φ^k: standard error σ² √((1 + φ^{2k})/20000), 5 of
+    /// them. False alarm 5.7e-7 for each of four lags; the first is the stationary start.
     #[test]
     fn gauss_markov_is_stationary_from_the_start() {
         let (sigma, tc) = (0.03, 0.2);

@@ -13,7 +13,8 @@ mod distribution {
         assert!((found - expected).abs() <= tolerance * scale, "{what}: {found:e}, expected {expected:e}");
     }
 
-    // mpmath 1.3: gammainc(dof/2, x/2, inf, regularized=True) at 50 digits; above 2e5 degrees of freedom quadrature of the density.
+    // mpmath 1.3: gammainc(dof/2, x/2, inf, regularized=True) at 50 digits; above 2e5 degrees of freedom quadrature
+    // of the density.
     const CHI_SQUARE: [(f64, f64, f64, f64); 22] = [
         (0.000982, 1.0, 0.024999120533269977, 0.97500087946673002),
         (5.0239, 1.0, 0.97500019940840437, 0.024999800591595625),
@@ -301,8 +302,9 @@ mod quadratic_form {
     use kfdesign::numerics::distribution::{chi_square_quantile, normal_sf};
     use kfdesign::numerics::quadratic_form::QuadraticForm;
 
-    /// Equal weights make a chi-square law. The saddlepoint formula is off by some 1e-3 of the tail for four degrees of freedom and less for more
-    /// (Barndorff-Nielsen 1990: order 1/n^1.5); straight lines between saddlepoints add at most as much.
+    /// Equal weights make a chi-square law. The saddlepoint formula is off by some 1e-3 of the tail for four degrees
+    /// of freedom and less for more (Barndorff-Nielsen 1990: order 1/n^1.5); straight lines between saddlepoints add
+    /// at most as much.
     #[test]
     fn equal_weights_are_chi_square() {
         for (weights, freedom) in [(4, 5.0), (3, 40.0), (40, 1.0), (1, 1e5)] {
@@ -318,8 +320,9 @@ mod quadratic_form {
         }
     }
 
-    /// Two degrees of freedom each are exponentials of mean 2 w: P(X > x) = Σ_i e^{−x/(2 w_i)} Π_{j≠i} w_i/(w_i − w_j). So few degrees of freedom
-    /// are the worst case, and the far tail, where one weight alone counts, its worst place: 5 %.
+    /// Two degrees of freedom each are exponentials of mean 2 w: P(X > x) = Σ_i e^{−x/(2 w_i)} Π_{j≠i} w_i/(w_i −
+    /// w_j). So few degrees of freedom are the worst case, and the far tail, where one weight alone counts, its
+    /// worst place: 5 %.
     #[test]
     fn pairs_are_sums_of_exponentials() {
         let weights: [f64; 4] = [3.0, 1.0, 0.5, 0.1];

@@ -157,9 +157,10 @@ fn check(rows: &[Row], gate: Option<f64>, log_likelihood: f64, nis: f64, counts:
     assert_relative_eq!(axis.start.unwrap().p_value, start.1, max_relative = 1e-8);
 }
 
-/// An independent filter in numpy 2.4.6 (Joseph form, a loop of predictions over gaps); statsmodels 0.15.0 (MLEModel.ssm.filter(),
-/// known initial state, NaN rows in the gaps) gives the same log-likelihood, −127.37343447181166, and the same last innovation.
-/// The start statistic: the innovations regressed on the answer of the same filter to a shift of x0 by one sigma of P0.
+/// An independent filter in numpy 2.4.6 (Joseph form, a loop of predictions over gaps); statsmodels 0.15.0
+/// (MLEModel.ssm.filter(), known initial state, NaN rows in the gaps) gives the same log-likelihood,
+/// −127.37343447181166, and the same last innovation. The start statistic: the innovations regressed on the answer
+/// of the same filter to a shift of x0 by one sigma of P0.
 #[test]
 fn equals_independent_filters() {
     let rows = [
@@ -299,9 +300,10 @@ fn draw(design: &FilterDesign, run: u64, samples: usize) -> Vec<f64> {
         .collect()
 }
 
-/// One hour at 100 Hz. The right design is consistent; each wrong one is caught for the right reason and on the right side.
-/// The right design alone may fail by chance, with probability at most alpha = 0.001 over seeds; the seed is fixed and was not chosen among several.
-/// σ × 2.24 is the seed paper's recipe on its own model; mean NIS cannot see it (its test passes), the low-frequency test does.
+/// One hour at 100 Hz. The right design is consistent; each wrong one is caught for the right reason and on the
+/// right side. The right design alone may fail by chance, with probability at most alpha = 0.001 over seeds; the
+/// seed is fixed and was not chosen among several. σ × 2.24 is the seed paper's recipe on its own model; mean NIS
+/// cannot see it (its test passes), the low-frequency test does.
 #[test]
 fn verdicts_on_an_hour_of_the_reference_sensor() {
     let right = skydog(0.01, 1.0, 1.0, 1.0);
@@ -329,8 +331,9 @@ fn verdicts_on_an_hour_of_the_reference_sensor() {
     }
 }
 
-/// 500 logs of the right design (25 min at 1 Hz) at alpha = 0.05: at most 0.05 are called inconsistent. Bound 0.05 + 4.9 standard deviations
-/// (1e-6 at the worst case); nearly all others must be consistent, since the logs are long enough.
+/// 500 logs of the right design (25 min at 1 Hz) at alpha = 0.05: at most 0.05 are called inconsistent. Bound 0.05 +
+/// 4.9 standard deviations (1e-6 at the worst case); nearly all others must be consistent, since the logs are long
+/// enough.
 #[test]
 fn right_designs_are_rarely_rejected() {
     let right = skydog(1.0, 1.0, 1.0, 1.0);
@@ -349,7 +352,8 @@ fn right_designs_are_rarely_rejected() {
     assert!(counts[0] >= 440, "{counts:?}");
 }
 
-/// The same with a gap: 500 logs of 3000 samples at 10 Hz of which 100 are missing; bound 0.05 + 4.9 standard deviations (1e-6).
+/// The same with a gap: 500 logs of 3000 samples at 10 Hz of which 100 are missing; bound 0.05 + 4.9 standard
+/// deviations (1e-6).
 #[test]
 fn gaps_reject_no_right_design() {
     let right = skydog(0.1, 1.0, 1.0, 1.0);
@@ -400,8 +404,8 @@ fn bias_outside_p0_is_named() {
     assert_relative_eq!(result.axes[0].start.unwrap().sigmas - first, 8.0, max_relative = 0.01);
 }
 
-/// Behind a gate of 2 sigma the NIS of accepted innovations is 0.774 (formulas: 1 − 2gφ(g)/p) and the verdict stays right: 200 logs of the right
-/// design at alpha = 0.01; more than 12 inconsistent have P < 1e-6.
+/// Behind a gate of 2 sigma the NIS of accepted innovations is 0.774 (formulas: 1 − 2gφ(g)/p) and the verdict stays
+/// right: 200 logs of the right design at alpha = 0.01; more than 12 inconsistent have P < 1e-6.
 #[test]
 fn gated_statistics_have_truncated_moments() {
     let right = skydog(1.0, 1.0, 1.0, 1.0);

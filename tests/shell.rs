@@ -1,4 +1,5 @@
-//! Completion scripts and manual pages are made of the same definitions as the help, so they must know all that it knows.
+//! Completion scripts and manual pages are made of the same definitions as the help, so they must know all that it
+//! knows.
 
 use std::process::Command;
 

@@ -1,4 +1,5 @@
-//! The simulator: truth adds up, streams are independent of everything else, and the command writes what the library made.
+//! The simulator: truth adds up, streams are independent of everything else, and the command writes what the library
+//! made.
 
 use kfdesign::input::{self, LogOptions};
 use kfdesign::noise::Kind;
@@ -146,7 +147,8 @@ mod library {
         let mut first: Vec<u64> = Vec::new();
         for (seed, run) in [(1, 0), (1, 1), (2, 0)] {
             for axis in simulate(&twin, &Scenario { seed, run, ..scenario(3) }, 3) {
-                // the ramp is the last and draws nothing; the random walk starts at 0: compare the third sample's change
+                // the ramp is the last and draws nothing; the random walk starts at 0: compare the third sample's
+                // change
                 for term in &axis.terms[..8] {
                     first.push((term[2] - term[1]).to_bits());
                 }
@@ -198,8 +200,8 @@ mod library {
         assert_eq!(found[0].drift, plain[0].drift, "truth is not rounded");
     }
 
-    /// 20 000 runs: (bias − 2 deg/s)/0.5 deg/s is standard normal. Mean within 5 standard errors (5.7e-7), variance in its
-    /// chi-square interval (1e-6).
+    /// 20 000 runs: (bias − 2 deg/s)/0.5 deg/s is standard normal. Mean within 5 standard errors (5.7e-7), variance
+    /// in its chi-square interval (1e-6).
     #[test]
     fn turn_on_bias_is_drawn_per_run() {
         let params = rich();
@@ -215,7 +217,8 @@ mod library {
         assert!(range.contains(&statistic), "variance {}", moments.variance());
     }
 
-    /// Reference sensor, 10 min at 100 Hz: the white part of each axis has variance N²/dt; chi-square, false alarm 3 × 1e-6.
+    /// Reference sensor, 10 min at 100 Hz: the white part of each axis has variance N²/dt; chi-square, false alarm 3
+    /// × 1e-6.
     #[test]
     fn reference_sensor_has_its_white_noise() {
         let params = Params::read(&data("params.json")).unwrap();
@@ -447,8 +450,8 @@ mod command {
         }
     }
 
-    /// `data/skydog_10min.csv.gz` made again by the command in data/README.md. On another platform the last bit of exp or ln
-    /// may differ, and with it the rounding of a number in a thousand.
+    /// `data/skydog_10min.csv.gz` made again by the command in data/README.md. On another platform the last bit of
+    /// exp or ln may differ, and with it the rounding of a number in a thousand.
     #[test]
     fn the_log_in_data_is_made_again() {
         let kept = data("skydog_10min.csv.gz");

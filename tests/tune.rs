@@ -332,7 +332,8 @@ fn flicker_is_approximated_within_the_stated_error() {
         }
         let worst = (stated.worst_tau_s / dt).round() as u64;
         close(error(worst).abs(), stated.max_relative_error, 1e-6);
-        // Averaged over many samples, the fast states in R are as good as states: without them this would be −added_to_r/2
+        // Averaged over many samples, the fast states in R are as good as states: without them this would be
+        // −added_to_r/2
         assert!(error(100).abs() < 0.25 * stated.added_to_r, "{name} {} {stated:?}", error(100));
     }
 }
@@ -355,8 +356,9 @@ fn every_shipped_sensor_tunes_and_verifies() {
     assert!(count >= 4);
 }
 
-/// The false-alarm probability of the verdict is at most alpha, and not much less: 400 designs that are true, alpha 0.05.
-/// Binomial(400, 0.05) exceeds 45 with probability 1e-7; were the size below 0.03, none at all would have probability 5e-6.
+/// The false-alarm probability of the verdict is at most alpha, and not much less: 400 designs that are true, alpha
+/// 0.05. Binomial(400, 0.05) exceeds 45 with probability 1e-7; were the size below 0.03, none at all would have
+/// probability 5e-6.
 #[test]
 fn the_verdict_has_its_false_alarm_probability() {
     let tuned = tuned(&sensor(10.0, vec![white(0.05), gauss_markov(0.03, 2.0)], Some(0.1)));
@@ -399,8 +401,8 @@ fn a_wrong_design_is_caught() {
     }
 }
 
-/// With other states than the filter's, the truth is compared by the whole drift: the same truth in another order passes
-/// (false alarm 1e-5), a second process that the filter does not have is seen.
+/// With other states than the filter's, the truth is compared by the whole drift: the same truth in another order
+/// passes (false alarm 1e-5), a second process that the filter does not have is seen.
 #[test]
 fn a_truth_of_other_states_is_judged_by_the_whole_drift() {
     let plan = Plan { runs: 100, steps: 3000, seed: 2, alpha: 1e-5 };

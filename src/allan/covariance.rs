@@ -11,10 +11,11 @@ use super::{Deviation, deviation, lag_sum};
 use crate::noise::{NoiseModel, Term};
 
 /// Covariance matrix of the overlapping Allan *variance* estimates at several averaging factors, from `samples` rate
-/// samples of period `dt` (s), for a Gaussian mixture: with c the cross-covariance of the second differences and μ their means,
-/// `cov(σ̂²_1, σ̂²_2) = Σ_k Σ_l [2 c(l−k)² + 4 μ_1 μ_2 c(l−k)] / (4 tau_1² tau_2² M_1 M_2)`, unit⁴.
+/// samples of period `dt` (s), for a Gaussian mixture: with c the cross-covariance of the second differences and μ
+/// their means, `cov(σ̂²_1, σ̂²_2) = Σ_k Σ_l [2 c(l−k)² + 4 μ_1 μ_2 c(l−k)] / (4 tau_1² tau_2² M_1 M_2)`, unit⁴.
 ///
-/// Rows of factors at which no difference fits are NaN. Cost: about a thousand covariances per pair, whatever the length.
+/// Rows of factors at which no difference fits are NaN. Cost: about a thousand covariances per pair, whatever the
+/// length.
 pub fn covariance(factors: &[u64], samples: usize, dt: f64, model: &NoiseModel) -> DMatrix<f64> {
     let slope = |term: &Term| if let Term::RateRamp { slope } = term { *slope } else { 0.0 };
     let random = model.terms.iter().copied().filter(|term| !matches!(term, Term::RateRamp { .. }));
@@ -25,8 +26,9 @@ pub fn covariance(factors: &[u64], samples: usize, dt: f64, model: &NoiseModel) 
 
 /// The covariance of the Allan variances as a quadratic form in the squares of the coefficients of some processes.
 ///
-/// c is linear in them, hence the covariance a sum over pairs of processes, whose parts are worked out once, when they are first asked for; and a
-/// part per process that a ramp brings. Rounding apart, nothing is neglected. Threads that ask at the same time share the work.
+/// c is linear in them, hence the covariance a sum over pairs of processes, whose parts are worked out once, when
+/// they are first asked for; and a part per process that a ramp brings. Rounding apart, nothing is neglected.
+/// Threads that ask at the same time share the work.
 #[derive(Debug)]
 pub struct Form {
     factors: Vec<u64>,
@@ -37,7 +39,8 @@ pub struct Form {
     pairs: Vec<Pair>,
 }
 
-/// Two points, and what each pair of processes (a ≥ b, row by row), then each process with a ramp of slope 1/s, adds to their covariance.
+/// Two points, and what each pair of processes (a ≥ b, row by row), then each process with a ramp of slope 1/s, adds
+/// to their covariance.
 #[derive(Debug)]
 struct Pair {
     points: (usize, usize),
@@ -61,7 +64,8 @@ impl Form {
     }
 
     fn work_out(&self) {
-        // no thread waits for another: one that waited with a claim of its own further down its stack would wait for ever
+        // no thread waits for another: one that waited with a claim of its own further down its stack would wait for
+        // ever
         self.pairs.par_iter().for_each(|pair| {
             if !pair.taken.swap(true, Ordering::Relaxed) {
                 // filled already only by the same numbers
@@ -70,8 +74,8 @@ impl Form {
         });
     }
 
-    /// When the square of the coefficient of these processes is so many times what it was given as, the others are absent, and the rate has a
-    /// ramp of `slope` (unit/s).
+    /// When the square of the coefficient of these processes is so many times what it was given as, the others are
+    /// absent, and the rate has a ramp of `slope` (unit/s).
     pub fn covariance(&self, weights: &[(usize, f64)], slope: f64) -> DMatrix<f64> {
         if self.pairs.iter().any(|pair| pair.parts.get().is_none()) {
             self.work_out();

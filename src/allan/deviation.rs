@@ -55,7 +55,8 @@ pub fn terms(deviation: Deviation, samples: usize, m: u64) -> u64 {
     }
 }
 
-/// The variance at averaging factor `m` from phase (n + 1 values, unit·s) with sample period `dt` (s); see [`variances`].
+/// The variance at averaging factor `m` from phase (n + 1 values, unit·s) with sample period `dt` (s); see
+/// [`variances`].
 pub fn variance(deviation: Deviation, phase: &[f64], dt: f64, m: u64) -> Result<Estimate, AllanError> {
     let mut estimates = variances(deviation, phase, dt, &[m])?;
     estimates.pop().ok_or(AllanError::TooShort { samples: 0, needed: 1 })
@@ -68,8 +69,8 @@ pub fn variance(deviation: Deviation, phase: &[f64], dt: f64, m: u64) -> Result<
 /// * HDEV, overlapping HDEV: `⟨(x_{k+3m} − 3x_{k+2m} + 3x_{k+m} − x_k)²⟩ / (6 tau²)`
 /// * TOTDEV: second differences centred on every inner point, phase continued at both ends by odd reflection
 ///
-/// Each value is the same to the bit whichever other factors are asked for. Fails with [`AllanError::TooShort`] when at one of them not even one
-/// difference fits.
+/// Each value is the same to the bit whichever other factors are asked for. Fails with [`AllanError::TooShort`] when
+/// at one of them not even one difference fits.
 pub fn variances(deviation: Deviation, phase: &[f64], dt: f64, factors: &[u64]) -> Result<Vec<Estimate>, AllanError> {
     let samples = phase.len().saturating_sub(1);
     let counts: Vec<u64> = factors.iter().map(|m| terms(deviation, samples, *m)).collect();
@@ -128,7 +129,8 @@ fn reflected(x: &[f64], i: isize) -> f64 {
     }
 }
 
-/// Σ of the squares of the second differences of the reflected phase that reach over an end of it: centres 1 … m − 1 from either.
+/// Σ of the squares of the second differences of the reflected phase that reach over an end of it: centres 1 … m − 1
+/// from either.
 fn at_the_ends(x: &[f64], m: usize) -> f64 {
     let last = x.len() as isize - 1;
     let span = m as isize;

@@ -60,9 +60,9 @@ pub fn interval(deviation: f64, edf: f64) -> (f64, f64) {
     (deviation * factor(0.975), deviation * factor(0.025))
 }
 
-/// Mean of the variance that [`deviation::variance`] estimates, for this mixture, unit². Exact with three remarks: a random
-/// walk, flicker and Gauss-Markov in their sampled forms; TOTDEV is taken as the Allan variance that it approximates
-/// (it falls below by up to tau/T × 0.48 for flicker, 0.75 for random walk: NIST SP 1065, table 7).
+/// Mean of the variance that [`deviation::variance`] estimates, for this mixture, unit². Exact with three remarks: a
+/// random walk, flicker and Gauss-Markov in their sampled forms; TOTDEV is taken as the Allan variance that it
+/// approximates (it falls below by up to tau/T × 0.48 for flicker, 0.75 for random walk: NIST SP 1065, table 7).
 pub fn expected_variance(kind: Deviation, m: u64, dt: f64, model: &NoiseModel) -> f64 {
     let (span, tau) = (m as i64, m as f64 * dt);
     let second = |h: i64| autocovariance(model, m, h, dt);
@@ -168,8 +168,9 @@ fn greenhall_riley_modified(samples: usize, m: u64, noise: NoiseType) -> f64 {
     count / sum
 }
 
-/// TOTDEV: `b T/tau − c` (NIST SP 1065, table 7) for white, flicker and random walk, which holds for large m; at small m
-/// it is reduced as the exact edf of the overlapping ADEV is. Quantisation has no published value: that of overlapping ADEV.
+/// TOTDEV: `b T/tau − c` (NIST SP 1065, table 7) for white, flicker and random walk, which holds for large m; at
+/// small m it is reduced as the exact edf of the overlapping ADEV is. Quantisation has no published value: that of
+/// overlapping ADEV.
 fn total(samples: usize, m: u64, noise: NoiseType) -> f64 {
     let oadev = |samples: u64, m: u64| {
         power_law_degrees_of_freedom(Deviation::Oadev, usize::try_from(samples).unwrap_or(usize::MAX), m, noise)

@@ -13,13 +13,14 @@ const STEP_FRACTION: i64 = 8;
 
 /// `Σ f(h)` over the closed range with half weight at its two ends (so that adjoining ranges add up).
 ///
-/// `kinks`: sorted lags at which `f` or a derivative may jump or have a boundary layer (they need not lie in the range);
-/// `breaks`: sorted lags at which `f` only changes its polynomial form (weights), which need no refinement.
+/// `kinks`: sorted lags at which `f` or a derivative may jump or have a boundary layer (they need not lie in the
+/// range); `breaks`: sorted lags at which `f` only changes its polynomial form (weights), which need no refinement.
 pub(super) fn sum(lags: RangeInclusive<i64>, kinks: &[i64], breaks: &[i64], f: impl Fn(i64) -> f64) -> f64 {
     nodes(lags, kinks, breaks).into_iter().map(|(lag, weight)| weight * f(lag)).sum()
 }
 
-/// The lags at which [`sum`] asks for values, ascending, and the weight of each: they depend on the kinks only. None of an empty range.
+/// The lags at which [`sum`] asks for values, ascending, and the weight of each: they depend on the kinks only. None
+/// of an empty range.
 pub(super) fn nodes(lags: RangeInclusive<i64>, kinks: &[i64], breaks: &[i64]) -> Vec<(i64, f64)> {
     let (first, last) = lags.into_inner();
     let mut cuts: Vec<i64> =
@@ -66,10 +67,11 @@ fn piece(from: i64, to: i64, kinks: &[i64], nodes: &mut Vec<(i64, f64)>) {
     }
 }
 
-/// Weights of f(0), f(s) and f(2s) in the integer sum (half weight at both ends) over 4 s lags of the quartic through f(0), f(s), … f(4s).
+/// Weights of f(0), f(s) and f(2s) in the integer sum (half weight at both ends) over 4 s lags of the quartic
+/// through f(0), f(s), … f(4s).
 fn panel(s: f64) -> [f64; 3] {
-    // even part about the middle: f(2s) + c2 (u/s)² + c4 (u/s)⁴, c4 = (outer − 4 inner)/12, c2 = inner − c4, where inner and outer are
-    // (f(s) + f(3s))/2 and (f(0) + f(4s))/2 less f(2s); the odd part sums to zero
+    // even part about the middle: f(2s) + c2 (u/s)² + c4 (u/s)⁴, c4 = (outer − 4 inner)/12, c2 = inner − c4, where
+    // inner and outer are (f(s) + f(3s))/2 and (f(0) + f(4s))/2 less f(2s); the odd part sums to zero
     let squares = 16.0 * s / 3.0 + 2.0 / (3.0 * s);
     let fourths = 64.0 * s / 5.0 + 16.0 / (3.0 * s) - 2.0 / (15.0 * s * s * s);
     let outer = (fourths - squares) / 12.0;

@@ -130,8 +130,8 @@ pub enum AllanError {
     NotFinite { index: usize },
 }
 
-/// The curve of uniformly sampled rate data (SI), intervals with the degrees of freedom of the power law identified at each point.
-/// [`AllanCurve::refine`] replaces them by the exact ones of a fitted mixture.
+/// The curve of uniformly sampled rate data (SI), intervals with the degrees of freedom of the power law identified
+/// at each point. [`AllanCurve::refine`] replaces them by the exact ones of a fitted mixture.
 ///
 /// `rate` without gaps, `dt` in s. Fails on fewer samples than one difference needs and on NaN or infinite samples.
 pub fn curve(rate: &[f64], dt: f64, deviation: Deviation, grid: TauGrid) -> Result<AllanCurve, AllanError> {
@@ -139,7 +139,8 @@ pub fn curve(rate: &[f64], dt: f64, deviation: Deviation, grid: TauGrid) -> Resu
     curve_of(&deviation::phase(rate, dt), dt, deviation, grid)
 }
 
-/// The same from the phase itself (angle of a gyro, velocity of an accelerometer; unit·s): n + 1 points stand for n rate samples.
+/// The same from the phase itself (angle of a gyro, velocity of an accelerometer; unit·s): n + 1 points stand for n
+/// rate samples.
 pub fn curve_from_phase(phase: &[f64], dt: f64, deviation: Deviation, grid: TauGrid) -> Result<AllanCurve, AllanError> {
     check(phase, deviation, 1)?;
     curve_of(phase, dt, deviation, grid)

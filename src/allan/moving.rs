@@ -4,15 +4,17 @@ use rayon::prelude::*;
 
 use crate::numerics::reduce::Sum;
 
-/// Sums that are moved along from one that is computed anew; more where a sum is longer, so that starting costs as much as moving at most.
+/// Sums that are moved along from one that is computed anew; more where a sum is longer, so that starting costs as
+/// much as moving at most.
 const FEWEST: usize = 1 << 14;
 /// Sums squared between two compensated additions.
 const BLOCK: usize = 1024;
 
 /// Σ_{j<count} (Σ_{i=j}^{j+m−1} z_i)², z the second differences of x at factor m.
 ///
-/// The inner sum is moved along by z_{j+m} − z_j, plainly: over the stretch that one start serves rounding adds up to less than its length in units
-/// of 2^−53 of the largest sum. Stretches are added in their order, whichever thread did them.
+/// The inner sum is moved along by z_{j+m} − z_j, plainly: over the stretch that one start serves rounding adds up
+/// to less than its length in units of 2^−53 of the largest sum. Stretches are added in their order, whichever
+/// thread did them.
 pub(super) fn sum_of_squares(x: &[f64], count: usize, m: usize) -> f64 {
     let stretch = FEWEST.max(m);
     let parts: Vec<f64> = (0..count)

@@ -20,14 +20,15 @@ pub fn exponent(phase: &[f64], m: usize) -> Option<f64> {
 
 /// The type at averaging factor `m` from `phase` (n + 1 points, unit·s).
 ///
-/// α rounded: 0 white, −1 flicker, −2 random walk, 1 or 2 quantisation (both fall as 1/tau in the Allan deviation); a
-/// ramp where the mean step between averages is larger than their scatter. Unknown with fewer than 30 averages, constant
-/// ones, and beyond α = −2.
+/// α rounded: 0 white, −1 flicker, −2 random walk, 1 or 2 quantisation (both fall as 1/tau in the Allan deviation);
+/// a ramp where the mean step between averages is larger than their scatter. Unknown with fewer than 30 averages,
+/// constant ones, and beyond α = −2.
 pub fn identify(phase: &[f64], m: usize) -> NoiseType {
     Evidence::of(phase, m).kind()
 }
 
-/// What one log or several say about the type: the sums behind the autocorrelation, of averages without the trend of their own log.
+/// What one log or several say about the type: the sums behind the autocorrelation, of averages without the trend of
+/// their own log.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Evidence {
     /// Sums of squares of the averages, and of their first and second differences, all without their means.
@@ -81,7 +82,8 @@ impl Evidence {
     }
 }
 
-/// Adjoining averages over m samples times m dt, `a_j = θ_{(j+1)m} − θ_{jm}`, at least [`FEWEST_AVERAGES`] of them; never all in memory.
+/// Adjoining averages over m samples times m dt, `a_j = θ_{(j+1)m} − θ_{jm}`, at least [`FEWEST_AVERAGES`] of them;
+/// never all in memory.
 struct Averages<'a> {
     phase: &'a [f64],
     m: usize,

@@ -11,8 +11,9 @@ const CHAINS: usize = 8;
 
 /// Phase of rate samples without their mean: `θ_0 = 0, θ_k = dt Σ_{j<k} (y_j − ȳ)`, n + 1 values in unit·s.
 ///
-/// No member of the family sees the mean; without it the phase stays small and the differences keep their digits. The sums at the starts of blocks
-/// are compensated, within a block of 8192 samples they are plain. The same to the bit for any number of threads.
+/// No member of the family sees the mean; without it the phase stays small and the differences keep their digits.
+/// The sums at the starts of blocks are compensated, within a block of 8192 samples they are plain. The same to the
+/// bit for any number of threads.
 pub fn phase(rate: &[f64], dt: f64) -> Vec<f64> {
     let level = mean(rate);
     let mut so_far = Sum::default();

@@ -7,11 +7,13 @@ use super::noise_id::Evidence;
 use super::{AllanCurve, AllanError, AllanPoint, Deviation, NoiseType, TauGrid, edf, tau};
 use crate::numerics::reduce::Sum;
 
-/// Mean squares of differences over windows of the same length: with `V_w(m)` the variance estimate of window w, `V(m) = Σ_w V_w(m)/W`.
+/// Mean squares of differences over windows of the same length: with `V_w(m)` the variance estimate of window w,
+/// `V(m) = Σ_w V_w(m)/W`.
 ///
-/// Every window gives each averaging time the same number of differences, so this is the mean square of all differences that lie within a
-/// window; those that reach over an end are not taken. Averaging times stop where one window's do. Degrees of freedom add up, as if the windows had
-/// independent noise; of drift slower than a window they have not, but it is taken off each window with its mean and slope, all but a little.
+/// Every window gives each averaging time the same number of differences, so this is the mean square of all
+/// differences that lie within a window; those that reach over an end are not taken. Averaging times stop where one
+/// window's do. Degrees of freedom add up, as if the windows had independent noise; of drift slower than a window
+/// they have not, but it is taken off each window with its mean and slope, all but a little.
 #[derive(Clone, Debug)]
 pub struct Pooled {
     kind: Deviation,
@@ -31,7 +33,8 @@ impl Pooled {
         Pooled { kind, samples, dt, factors, variances, evidence, windows: 0 }
     }
 
-    /// Another window: its phase, finite, one point more than a window has samples. [`AllanError::TooShort`] when it has fewer.
+    /// Another window: its phase, finite, one point more than a window has samples. [`AllanError::TooShort`] when it
+    /// has fewer.
     pub fn add(&mut self, phase: &[f64]) -> Result<(), AllanError> {
         if phase.len() != self.samples + 1 {
             return Err(AllanError::TooShort { samples: phase.len().saturating_sub(1), needed: self.samples });
@@ -49,7 +52,8 @@ impl Pooled {
         self.windows
     }
 
-    /// The curve, intervals with the degrees of freedom of the power law at each point; see [`super::curve`]. NaN without a window.
+    /// The curve, intervals with the degrees of freedom of the power law at each point; see [`super::curve`]. NaN
+    /// without a window.
     pub fn curve(&self) -> AllanCurve {
         let Pooled { kind, samples, dt, .. } = *self;
         let windows = self.windows as f64;

@@ -1,10 +1,11 @@
 //! Sums of squares of second and third differences of phase, at many averaging factors in one walk over it.
 //!
-//! The start points k are cut into windows of fixed length. In a window all factors are done before the next one begins, four at a time: they share
-//! the load of x_k, and the streams x_{k+m}, x_{k+2m} of small factors are still in the cache from their neighbours. Windows are
-//! independent, so threads take them as they come; a window's sum is always added up in the same sixteen lanes and windows are added in their order,
-//! compensated. So the result is the same to the bit for any number of threads, any instruction set, and whichever other factors are asked for.
-//! All terms are positive: rounding changes a sum by less than 1200 units of 2^−53, 1.4e-13 of it.
+//! The start points k are cut into windows of fixed length. In a window all factors are done before the next one
+//! begins, four at a time: they share the load of x_k, and the streams x_{k+m}, x_{k+2m} of small factors are still
+//! in the cache from their neighbours. Windows are independent, so threads take them as they come; a window's sum is
+//! always added up in the same sixteen lanes and windows are added in their order, compensated. So the result is the
+//! same to the bit for any number of threads, any instruction set, and whichever other factors are asked for. All
+//! terms are positive: rounding changes a sum by less than 1200 units of 2^−53, 1.4e-13 of it.
 
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;

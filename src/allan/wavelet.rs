@@ -1,9 +1,10 @@
 //! Haar wavelet variance: the Allan variance in the words of wavelets.
 //!
-//! The maximum-overlap coefficient of level j is W_{j,k} = ½ (ȳ_k − ȳ_{k−m}), ȳ_k the mean of the m = 2^{j−1} samples that end at k. Hence
-//! ν²_j = E W² = ½ σ²_A(m dt), and the unbiased estimate, the mean square of the n − 2^j + 1 coefficients that no end of the log touches, is half
-//! the overlapping Allan variance. White noise of variance s² per sample: s²/2^j.
-//! Sources: Percival & Guttorp 1994; Percival & Walden 2000, sections 5.2 and 8.3; Guerrier, Skaloud, Stebler & Victoria-Feser 2013, section 2.
+//! The maximum-overlap coefficient of level j is W_{j,k} = ½ (ȳ_k − ȳ_{k−m}), ȳ_k the mean of the m = 2^{j−1}
+//! samples that end at k. Hence ν²_j = E W² = ½ σ²_A(m dt), and the unbiased estimate, the mean square of the n −
+//! 2^j + 1 coefficients that no end of the log touches, is half the overlapping Allan variance. White noise of
+//! variance s² per sample: s²/2^j. Sources: Percival & Guttorp 1994; Percival & Walden 2000, sections 5.2 and 8.3;
+//! Guerrier, Skaloud, Stebler & Victoria-Feser 2013, section 2.
 
 use super::{AllanCurve, AllanPoint, Deviation};
 use crate::noise::NoiseModel;
@@ -23,7 +24,8 @@ pub struct Level {
     pub terms: u64,
 }
 
-/// The levels of a curve of overlapping Allan deviations at averaging factors among which are powers of two; of other deviations none.
+/// The levels of a curve of overlapping Allan deviations at averaging factors among which are powers of two; of
+/// other deviations none.
 pub fn levels(curve: &AllanCurve) -> Vec<Level> {
     let half_square = |deviation: f64| 0.5 * deviation * deviation;
     let of = |point: &AllanPoint| Level {

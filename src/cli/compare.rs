@@ -10,9 +10,10 @@ use crate::view;
 
 /// Does a noise model fit a log that it may not come from?
 ///
-/// The Allan curve within the envelope the model draws around its own, the spectrum over the model's, and what the model's filter leaves of the
-/// log. A test fails when its deviation is significant (Holm, over all tests and axes) and beyond what is tolerated. Exit status 1 when
-/// the verdict is inconsistent, or inconclusive without --allow-inconclusive.
+/// The Allan curve within the envelope the model draws around its own, the spectrum over the model's, and what the
+/// model's filter leaves of the log. A test fails when its deviation is significant (Holm, over all tests and axes)
+/// and beyond what is tolerated. Exit status 1 when the verdict is inconsistent, or inconclusive without
+/// --allow-inconclusive.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples: kfdesign compare params.json other_day.csv --report compare.html; kfdesign compare imu.yaml log.bag --parameters"

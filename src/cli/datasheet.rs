@@ -13,9 +13,10 @@ use crate::units::{Dimension, Quantity};
 
 /// Noise parameters from the words that datasheets print
 ///
-/// Every value carries the unit of the datasheet ("0.15 deg/sqrt(h)", "2.8 mdps/sqrt(Hz)", "90 ug/sqrt(Hz)", "2.3 deg/h"); the units tell whether it is
-/// a gyro or an accelerometer. The rule behind each parameter is said, and what a datasheet leaves open is asked for. `compare FILE LOG --parameters` puts
-/// the numbers beside what a log says.
+/// Every value carries the unit of the datasheet ("0.15 deg/sqrt(h)", "2.8 mdps/sqrt(Hz)", "90 ug/sqrt(Hz)", "2.3
+/// deg/h"); the units tell whether it is a gyro or an accelerometer. The rule behind each parameter is said, and
+/// what a datasheet leaves open is asked for. `compare FILE LOG --parameters` puts the numbers beside what a log
+/// says.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example: kfdesign datasheet --angle-random-walk \"0.13 deg/sqrt(h)\" --bias-instability \"2.3 deg/h\" --rate 100 -o params.json"
@@ -36,7 +37,8 @@ pub struct Args {
     /// Noise density, spectral noise density: "2.8 mdps/sqrt(Hz)", "90 ug/sqrt(Hz)"; see --sided
     #[arg(long, visible_alias = "noise-spectral-density", value_name = "VALUE", allow_hyphen_values = true)]
     noise_density: Option<String>,
-    /// Whether the noise density is one-sided (deviation in a band = density sqrt(band)) or two-sided (as a random walk is)
+    /// Whether the noise density is one-sided (deviation in a band = density sqrt(band)) or two-sided (as a random
+    /// walk is)
     #[arg(long, value_enum, requires = "noise_density")]
     sided: Option<SidesArg>,
     /// Total noise, rms noise, output noise in --bandwidth: "0.05 deg/s"
@@ -54,7 +56,8 @@ pub struct Args {
     /// What the bias instability is
     #[arg(long, value_enum, default_value_t = InstabilityArg::Floor)]
     instability: InstabilityArg,
-    /// Correlation time of the drift: "200 s"; makes a Gauss-Markov process of the bias instability, which else is flicker
+    /// Correlation time of the drift: "200 s"; makes a Gauss-Markov process of the bias instability, which else is
+    /// flicker
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     correlation_time: Option<String>,
     /// Rate random walk: "0.5 deg/h/sqrt(h)"

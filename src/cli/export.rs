@@ -29,24 +29,26 @@ pub struct Args {
     /// Whose file it is
     #[arg(long, value_enum, value_name = "TARGET")]
     to: TargetFlag,
-    /// The file [default: stdout]. c: NAME.c, which gets NAME.h and NAME_test.c beside it; NAME begins the names of types and functions
+    /// The file [default: stdout]. c: NAME.c, which gets NAME.h and NAME_test.c beside it; NAME begins the names of
+    /// types and functions
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Noise parameters of the other sensor of the unit
     #[arg(long, value_name = "PARAMS")]
     accelerometer: Option<PathBuf>,
-    /// Rate of the log that the program will read, or of its filter's steps, in Hz [default: that of the parameters; px4: 100, ardupilot: 83.3]
+    /// Rate of the log that the program will read, or of its filter's steps, in Hz [default: that of the parameters;
+    /// px4: 100, ardupilot: 83.3]
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     rate: Option<f64>,
     /// Multiply every white density and every drift; written beside the identified numbers
     #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
     inflate: Option<f64>,
-    /// Where the file has one number for three axes: worst, mean (root mean square) or the name of an axis [default: worst]. c, rust: the one axis
-    /// to write [default: all]
+    /// Where the file has one number for three axes: worst, mean (root mean square) or the name of an axis [default:
+    /// worst]. c, rust: the one axis to write [default: all]
     #[arg(long, value_name = "AXIS")]
     axis: Option<String>,
-    /// Where the file knows no other drift than a random walk: least (what costs the program's filter least), short (the growth over short
-    /// times) or horizon=60s (the growth over that time) [default: least]
+    /// Where the file knows no other drift than a random walk: least (what costs the program's filter least), short
+    /// (the growth over short times) or horizon=60s (the growth over that time) [default: least]
     #[arg(long, value_name = "RULE")]
     walk: Option<String>,
     /// Write zeros where no drift is known

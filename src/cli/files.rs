@@ -37,7 +37,8 @@ impl Kind {
         }
     }
 
-    /// Refuses an ending that says something else than what is written. Nothing is said by a name without an ending, or by a device.
+    /// Refuses an ending that says something else than what is written. Nothing is said by a name without an ending,
+    /// or by a device.
     fn check(self, flag: &str, path: &Path) -> anyhow::Result<()> {
         if self == Kind::Table {
             return Ok(crate::export::table::check_ending(path)?);
@@ -60,8 +61,9 @@ impl Kind {
 /// An output with its flag.
 pub(super) type Output<'a> = (&'a str, &'a Option<PathBuf>, Kind);
 
-/// Refuses, before the work, what would be refused after it: two outputs of one name, an ending that is not what is written, an output
-/// that is an input or cannot be written, a named pipe. A device or an open pipe (`/dev/null`, `/dev/stdout`) may take several outputs.
+/// Refuses, before the work, what would be refused after it: two outputs of one name, an ending that is not what is
+/// written, an output that is an input or cannot be written, a named pipe. A device or an open pipe (`/dev/null`,
+/// `/dev/stdout`) may take several outputs.
 pub(super) fn check(outputs: &[Output<'_>], inputs: &[&Path]) -> anyhow::Result<()> {
     let mut files: Vec<(&str, PathBuf)> = Vec::new();
     let given = || outputs.iter().filter_map(|(flag, path, kind)| Some((*flag, path.as_deref()?, *kind)));

@@ -12,8 +12,8 @@ use crate::view;
 
 /// Noise parameters from a log at rest, with intervals
 ///
-/// What the log cannot tell is listed under not_identified with the reason and, where it can be said, the log length that
-/// would tell; it is never filled in with a number.
+/// What the log cannot tell is listed under not_identified with the reason and, where it can be said, the log length
+/// that would tell; it is never filled in with a number.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example: kfdesign identify static.csv --unit deg/s --rate 100 -o params.json --report identify.html"

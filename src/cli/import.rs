@@ -14,8 +14,8 @@ use crate::view;
 
 /// Noise parameters from the files of other programs
 ///
-/// Kalibr, OpenVINS, ORB-SLAM3, imu_utils (both kinds) and gnss-ins-sim, known by their content. What each number is and how it became a parameter is
-/// said. `compare FILE LOG --parameters` puts them beside what a log says.
+/// Kalibr, OpenVINS, ORB-SLAM3, imu_utils (both kinds) and gnss-ins-sim, known by their content. What each number is
+/// and how it became a parameter is said. `compare FILE LOG --parameters` puts them beside what a log says.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: kfdesign import imu.yaml -o gyro.json --accelerometer accelerometer.json")]
 pub struct Args {

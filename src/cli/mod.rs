@@ -1,7 +1,7 @@
 //! One file per command; the only place that prints and exits (floor 7).
 //!
-//! Exit status: 0 done and consistent; 1 done, but a stated check failed or could not be judged; 2 could not do it, with one clear line.
-//! It is that of the work, once known, whatever happens to stdout or stderr.
+//! Exit status: 0 done and consistent; 1 done, but a stated check failed or could not be judged; 2 could not do it,
+//! with one clear line. It is that of the work, once known, whatever happens to stdout or stderr.
 
 pub mod airplane;
 pub mod allan;
@@ -101,8 +101,8 @@ enum Command {
     Man(man::Args),
 }
 
-/// Runs a command line, whose first word is the name of the program, and gives its exit status. Signals are the caller's:
-/// see [`Stop`].
+/// Runs a command line, whose first word is the name of the program, and gives its exit status. Signals are the
+/// caller's: see [`Stop`].
 pub fn run(args: impl IntoIterator<Item = OsString>, stop: &Stop) -> u8 {
     let cli = match Cli::try_parse_from(args) {
         Ok(cli) => cli,
@@ -150,8 +150,8 @@ pub fn run(args: impl IntoIterator<Item = OsString>, stop: &Stop) -> u8 {
     })
 }
 
-/// Where the machine gives no threads, for want of processes or of memory, this one does all the work. Rayon makes its threads at the first
-/// need and cannot go on without them, so it is tried before.
+/// Where the machine gives no threads, for want of processes or of memory, this one does all the work. Rayon makes
+/// its threads at the first need and cannot go on without them, so it is tried before.
 fn find_threads() {
     if rayon::ThreadPoolBuilder::new().build().is_err() {
         let _ = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global();

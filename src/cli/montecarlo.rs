@@ -35,8 +35,8 @@ const MAX_THREADS: usize = 1024;
 
 /// Many simulated runs through filter.json: does its covariance tell the truth?
 ///
-/// The verdict is a gate for CI: exit status 0 consistent, 1 inconsistent. A true filter is called inconsistent with probability
-/// --alpha, all tests and axes together; that probability is measured and printed.
+/// The verdict is a gate for CI: exit status 0 consistent, 1 inconsistent. A true filter is called inconsistent with
+/// probability --alpha, all tests and axes together; that probability is measured and printed.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples: kfdesign montecarlo filter.json --runs 1000 --duration 600s\n          \
 kfdesign montecarlo filter.json --truth params.json --junit montecarlo.xml --report montecarlo.html\n          \
@@ -47,8 +47,8 @@ pub struct Args {
     /// Number of runs, or a range A..B of run numbers (B not included)
     #[arg(long, default_value = "1000", value_name = "N|A..B", allow_hyphen_values = true)]
     runs: String,
-    /// Length of a run, for example 600s or 2h [default: 600s; where the filter settles more slowly, twice its settling time, up to 600000
-    /// samples]
+    /// Length of a run, for example 600s or 2h [default: 600s; where the filter settles more slowly, twice its
+    /// settling time, up to 600000 samples]
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     duration: Option<String>,
     #[arg(long, default_value_t = 1, value_name = "N", value_parser = whole::<u64>, allow_negative_numbers = true)]
@@ -72,7 +72,8 @@ pub struct Args {
     /// Average NEES and NIS at every step, as a table (.csv, .csv.gz or .npy)
     #[arg(long, value_name = "FILE", conflicts_with = "run")]
     every_step: Option<PathBuf>,
-    /// Go on from what -o FILE holds of the same experiment; without it, a file that is there is replaced only when the work is done
+    /// Go on from what -o FILE holds of the same experiment; without it, a file that is there is replaced only when
+    /// the work is done
     #[arg(long, requires = "output")]
     resume: bool,
     /// Threads; the results do not depend on it
@@ -84,8 +85,8 @@ pub struct Args {
 
 /// One verdict from documents of `montecarlo`
 ///
-/// The documents must be of one experiment and their runs must adjoin; the result is byte for byte that of all runs in one go. One document
-/// alone, also of interrupted work, is judged as it is.
+/// The documents must be of one experiment and their runs must adjoin; the result is byte for byte that of all runs
+/// in one go. One document alone, also of interrupted work, is judged as it is.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: kfdesign merge shard-*.json -o montecarlo.json")]
 pub struct MergeArgs {
@@ -118,7 +119,8 @@ struct Outputs {
     /// Simulate each of these sizes, and the given truth, in this many whole experiments and count what is caught
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = whole::<u64>, allow_negative_numbers = true)]
     confirm: u64,
-    /// How many runs, or how long ones, see this mistuning: \"gauss_markov.std_dev x1.3\" (the filter's value is 1.3 times the true one)
+    /// How many runs, or how long ones, see this mistuning: \"gauss_markov.std_dev x1.3\" (the filter's value is 1.3
+    /// times the true one)
     #[arg(long, value_name = "\"PARAMETER xFACTOR\"")]
     plan: Vec<String>,
 }
@@ -406,7 +408,8 @@ impl Outputs {
     }
 }
 
-/// Course and gate of the design as its own truth: what power is about. Another truth may be judged by other components.
+/// Course and gate of the design as its own truth: what power is about. Another truth may be judged by other
+/// components.
 fn as_own_truth<'a>(
     experiment: &Experiment,
     course: &'a Course,
@@ -421,7 +424,8 @@ fn as_own_truth<'a>(
     Ok((Cow::Owned(own), Cow::Owned(gate)))
 }
 
-/// The axis, what is wrong about it and by how much: `gauss_markov.std_dev x1.3`, with `y:` before it for another axis than the first.
+/// The axis, what is wrong about it and by how much: `gauss_markov.std_dev x1.3`, with `y:` before it for another
+/// axis than the first.
 fn planned<'a>(
     experiment: &Experiment,
     course: &Course,

@@ -84,8 +84,8 @@ pub fn print_help(help: &clap::Error) {
     print_text(&if std::io::stdout().is_terminal() { text.ansi().to_string() } else { text.to_string() });
 }
 
-/// The status of the work, whatever became of what it said. Only where the work was done (0) and its text is lost for want of space, the
-/// work is one that could not be done (2).
+/// The status of the work, whatever became of what it said. Only where the work was done (0) and its text is lost
+/// for want of space, the work is one that could not be done (2).
 pub fn exit_status(work: u8) -> u8 {
     match (work, LOST.get()) {
         (0, Some(reason)) => {

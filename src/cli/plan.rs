@@ -10,8 +10,9 @@ use crate::view;
 
 /// How long to record, and at which rate, to know a parameter to a wished precision
 ///
-/// The precision is the relative standard deviation (1 sigma) of a maximum likelihood estimate with the model of params.json; its Cramér-Rao
-/// bound at these parameters is what is planned with. Exit status 1 when no log of up to ten years is enough.
+/// The precision is the relative standard deviation (1 sigma) of a maximum likelihood estimate with the model of
+/// params.json; its Cramér-Rao bound at these parameters is what is planned with. Exit status 1 when no log of up to
+/// ten years is enough.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example: kfdesign plan data/params.json --parameter gauss_markov.correlation_time --precision 10%"

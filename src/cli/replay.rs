@@ -12,8 +12,8 @@ use crate::view;
 
 /// A recorded log through filter.json, with a verdict
 ///
-/// Exit status 1 when the verdict is inconsistent, and when it is inconclusive (a log too short to judge the drift) unless
-/// --allow-inconclusive.
+/// Exit status 1 when the verdict is inconsistent, and when it is inconclusive (a log too short to judge the drift)
+/// unless --allow-inconclusive.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: kfdesign replay filter.json log.csv -o estimates.csv --innovations")]
 pub struct Args {

@@ -17,8 +17,9 @@ use crate::view;
 
 /// Steady flight, the linear model about it, its modes, handling-quality levels and controllability
 ///
-/// Straight, climbing or turning flight, of the section `trim` of a flight.json, or of an airplane.json by flags; flags replace what the document says.
-/// Flight that is not possible is refused by what is missing: lift, thrust, elevator.
+/// Straight, climbing or turning flight, of the section `trim` of a flight.json, or of an airplane.json by flags;
+/// flags replace what the document says. Flight that is not possible is refused by what is missing: lift, thrust,
+/// elevator.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example: kfdesign trim data/airplanes/aerosonde.json --speed \"25 m/s\" --altitude \"100 m\" -o linear.json"

@@ -15,8 +15,9 @@ use crate::view;
 
 /// The augmented Kalman filter from params.json
 ///
-/// States, exact F and Q, R, P0, steady gain, error budget and predicted sigma(t) of every axis. A quick Monte Carlo on the design's own
-/// model verifies it before anything is written; a design that fails is not written (exit status 1).
+/// States, exact F and Q, R, P0, steady gain, error budget and predicted sigma(t) of every axis. A quick Monte Carlo
+/// on the design's own model verifies it before anything is written; a design that fails is not written (exit status
+/// 1).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: kfdesign tune data/params.json -o filter.json --report design.html")]
 pub struct Args {

@@ -37,8 +37,9 @@ pub struct AllanEnvelope {
 
 /// The curve, its envelope and the test `allan_curve`.
 ///
-/// σ̂²(τ_i)·edf_i/σ²(τ_i) ~ χ²(edf_i) under the model, edf exact for its mixture; z_i is its normal score. The scores are taken as jointly normal
-/// with the exact correlations of the variance estimates, so that P(max |z|) and the envelope hold for all averaging times together.
+/// σ̂²(τ_i)·edf_i/σ²(τ_i) ~ χ²(edf_i) under the model, edf exact for its mixture; z_i is its normal score. The
+/// scores are taken as jointly normal with the exact correlations of the variance estimates, so that P(max |z|) and
+/// the envelope hold for all averaging times together.
 pub(super) fn allan_curve(
     axis: &str,
     rate: &[f64],
@@ -122,8 +123,8 @@ pub(super) fn normal_score(x: f64, edf: f64) -> f64 {
     if z.is_finite() { z } else { (2.0 * x).sqrt() - (2.0 * edf - 1.0).max(0.0).sqrt() }
 }
 
-/// Where |z| is largest, and, of all places where it is beyond the bound, where the ratio is farthest from one: what a test is surest of is not
-/// what matters most. The same place twice if none is beyond.
+/// Where |z| is largest, and, of all places where it is beyond the bound, where the ratio is farthest from one: what
+/// a test is surest of is not what matters most. The same place twice if none is beyond.
 pub(super) fn farthest(z: &[f64], bound: f64, ratio: &dyn Fn(usize) -> f64) -> (usize, usize) {
     let last = |i: usize, k: usize, size: &dyn Fn(usize) -> f64| if size(k) > size(i) { k } else { i };
     let surest = (1..z.len()).fold(0, |i, k| last(i, k, &|i| z[i].abs()));

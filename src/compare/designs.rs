@@ -1,4 +1,5 @@
-//! Designs of the same sensor ranked on logs: by the likelihood of what comes last in each log, with verdicts and what they claim.
+//! Designs of the same sensor ranked on logs: by the likelihood of what comes last in each log, with verdicts and
+//! what they claim.
 
 use schemars::JsonSchema;
 use serde::Serialize;

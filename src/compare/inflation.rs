@@ -1,11 +1,11 @@
 //! How many times louder a log is than the bench: the factor that vibration puts on wideband noise.
 //!
-//! Above a frequency that motion does not reach, u_j = P_j/S_j with P the power of the log's cosine coefficients (ends tapered, so that motion
-//! does not leak upwards) and S the spectrum of the bench model. The factor on densities is √(mean u). Beside it, √(median u/0.4549), 0.4549
-//! the median of χ²₁, which narrow lines do not move.
+//! Above a frequency that motion does not reach, u_j = P_j/S_j with P the power of the log's cosine coefficients
+//! (ends tapered, so that motion does not leak upwards) and S the spectrum of the bench model. The factor on
+//! densities is √(mean u). Beside it, √(median u/0.4549), 0.4549 the median of χ²₁, which narrow lines do not move.
 //!
-//! A log in pieces is cut into segments of one length between its gaps, each with a Hann window (in a short one motion leaks further up), whose coefficients
-//! are taken together.
+//! A log in pieces is cut into segments of one length between its gaps, each with a Hann window (in a short one
+//! motion leaks further up), whose coefficients are taken together.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -21,12 +21,13 @@ use crate::units::{Quantity, digits};
 
 /// Share of the log over which each end is brought to zero.
 const TAPER: f64 = 0.05;
-/// The log is in pieces when the longest stretch has less than this share of its samples; a length of segments is good when it keeps as much of what the shortest keep.
+/// The log is in pieces when the longest stretch has less than this share of its samples; a length of segments is
+/// good when it keeps as much of what the shortest keep.
 const MOST_OF_IT: f64 = 0.8;
 /// Samples of the shortest segments: a tenth of their band is a dozen coefficients.
 const SHORTEST_SEGMENT: usize = 256;
-/// How much neighbours go together in being above the median, over how much they do in size: normal probabilities in two dimensions, 0.48 for a Hann window and 0.37 for
-/// a narrow taper, which ties little.
+/// How much neighbours go together in being above the median, over how much they do in size: normal probabilities in
+/// two dimensions, 0.48 for a Hann window and 0.37 for a narrow taper, which ties little.
 const MEDIAN_TIES: f64 = 0.48;
 /// Fewest coefficients in the band.
 const FEWEST: usize = 100;
@@ -52,7 +53,8 @@ pub struct AxisInflation {
     /// Of the parameters.
     pub name: String,
     pub log_axis: String,
-    /// Used: the longest stretch without gaps and unusable samples, or a longer one whose short holes are filled in; or of all segments.
+    /// Used: the longest stretch without gaps and unusable samples, or a longer one whose short holes are filled in;
+    /// or of all segments.
     pub samples: usize,
     /// Of equal length, between the gaps of a log in pieces; 1 where it is one stretch.
     pub segments: usize,
@@ -227,7 +229,8 @@ fn pass_band_hz(model: &NoiseModel, rate_hz: f64) -> Option<f64> {
     model.terms.iter().filter_map(share).min_by(f64::total_cmp).map(|share| share * rate_hz)
 }
 
-/// Two or more segments of one length between gaps and unusable samples; none where one stretch is most of the log, or no other piece is long enough.
+/// Two or more segments of one length between gaps and unusable samples; none where one stretch is most of the log,
+/// or no other piece is long enough.
 fn segments(log: &LogAxis) -> Vec<&[f64]> {
     let seen = log.rate.len() - log.filled;
     if seen as f64 >= MOST_OF_IT * (seen + log.left_out) as f64 {
@@ -244,8 +247,8 @@ fn segments(log: &LogAxis) -> Vec<&[f64]> {
     length.map(cut).filter(|cut| cut.len() > 1).unwrap_or_default()
 }
 
-/// Samples about their mean with both ends brought to zero by half a cosine (Tukey 1967) over a share of them, of the same power, and the degrees of freedom that are
-/// left of each coefficient, (Σw²)²/(n Σw⁴).
+/// Samples about their mean with both ends brought to zero by half a cosine (Tukey 1967) over a share of them, of
+/// the same power, and the degrees of freedom that are left of each coefficient, (Σw²)²/(n Σw⁴).
 fn tapered(rate: &[f64], share: f64) -> (Vec<f64>, f64) {
     let (n, level) = (rate.len(), mean(rate));
     let edge = ((share * n as f64) as usize).max(1);
@@ -264,7 +267,8 @@ fn tapered(rate: &[f64], share: f64) -> (Vec<f64>, f64) {
     (out, squares * squares / (n as f64 * fourth))
 }
 
-/// √(median/0.4549) with the distribution-free 95 % interval of a median, the order statistics n/2 ± 1.96 √n/2, further apart where a taper ties neighbours together.
+/// √(median/0.4549) with the distribution-free 95 % interval of a median, the order statistics n/2 ± 1.96 √n/2,
+/// further apart where a taper ties neighbours together.
 fn robust(ratios: &Ratios) -> (f64, [f64; 2]) {
     let mut sorted = ratios.values.clone();
     sorted.sort_by(f64::total_cmp);
@@ -343,10 +347,11 @@ fn densities(multiplied: &[Kind]) -> String {
     format!("{} densities", names.join(" and "))
 }
 
-/// The parameters with every white, moving_average and band_limit density multiplied by the factor of its axis; all else as it was, and a note in `source`.
+/// The parameters with every white, moving_average and band_limit density multiplied by the factor of its axis; all
+/// else as it was, and a note in `source`.
 ///
-/// The interval becomes density times the interval of the factor: the product is what the log itself shows, so that the error of the
-/// bench value cancels.
+/// The interval becomes density times the interval of the factor: the product is what the log itself shows, so that
+/// the error of the bench value cancels.
 pub fn inflated(params: &Params, found: &Inflation) -> Params {
     let mut out = params.clone();
     let mut multiplied = Vec::new();

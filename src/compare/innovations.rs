@@ -12,7 +12,8 @@ use crate::replay::{LogShape, Nis, Options, Replayer, WhitenessSummary};
 use crate::tune::{TuneOptions, tune};
 use crate::units::{Quantity, Unit};
 
-/// Tests of a replay that judge the noise model: where the log starts is no matter of it, and slow drift is the Allan curve's.
+/// Tests of a replay that judge the noise model: where the log starts is no matter of it, and slow drift is the
+/// Allan curve's.
 const JUDGED: [TestKind; 2] = [TestKind::Nis, TestKind::Whiteness];
 /// Samples handed to the filter at a time.
 const BLOCK: usize = 4096;
@@ -24,7 +25,8 @@ pub struct Innovations {
     pub whiteness: Option<WhitenessSummary>,
 }
 
-/// The constant bias is no part of the comparison: the filter starts at the log's mean and is as unsure of it as ten times the log's spread.
+/// The constant bias is no part of the comparison: the filter starts at the log's mean and is as unsure of it as ten
+/// times the log's spread.
 pub(super) fn innovations(
     quantity: Quantity,
     rate_hz: f64,

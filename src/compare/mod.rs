@@ -1,8 +1,9 @@
 //! A noise model held against a log that it may not come from (floor 5): does it fit, and how much louder is the log?
 //!
-//! `curve` holds the Allan curve against the envelope that the model draws around its own, `spectrum` the spectrum in bands and as a whole,
-//! `innovations` what the model's filter leaves, `means` shows why equal means prove nothing, `parameters` puts a file's numbers beside the log's; `inflation` measures the factor between a
-//! bench log's wideband noise and that of a vehicle that vibrates; `designs` ranks filters on logs.
+//! `curve` holds the Allan curve against the envelope that the model draws around its own, `spectrum` the spectrum
+//! in bands and as a whole, `innovations` what the model's filter leaves, `means` shows why equal means prove
+//! nothing, `parameters` puts a file's numbers beside the log's; `inflation` measures the factor between a bench
+//! log's wideband noise and that of a vehicle that vibrates; `designs` ranks filters on logs.
 
 mod curve;
 pub mod designs;
@@ -44,7 +45,8 @@ pub struct LogAxis {
     pub filled: usize,
     /// Usable samples of the log that are not in `rate`.
     pub left_out: usize,
-    /// Piece by piece, how many samples are missing before it, then its samples, of which some may not be finite; empty where `rate` is all of the log.
+    /// Piece by piece, how many samples are missing before it, then its samples, of which some may not be finite;
+    /// empty where `rate` is all of the log.
     pub whole: Vec<(u64, Vec<f64>)>,
 }
 
@@ -88,7 +90,8 @@ pub struct AxisComparison {
     /// Of the parameters.
     pub name: String,
     pub log_axis: String,
-    /// Of which curve, spectrum and mean are: the longest stretch without gaps and unusable samples, or a longer one whose short holes are filled in.
+    /// Of which curve, spectrum and mean are: the longest stretch without gaps and unusable samples, or a longer one
+    /// whose short holes are filled in.
     pub samples: usize,
     pub filled: usize,
     /// Usable samples beside them.
@@ -128,12 +131,12 @@ pub struct Comparison {
 
 /// Holds the model of every axis against the log; the model is sampled at the log's rate.
 ///
-/// Tests per axis: `allan_curve`, `spectrum_ratio`, `cumulative_spectrum`, and of the model's filter `nis` and `whiteness`; Holm's adjustment
-/// over all tests and axes, p-values and effects to a verdict by [`effect::judge`]. Inconclusive also when the log is too short to show the
-/// model's drift. `alpha` in (0, 1).
+/// Tests per axis: `allan_curve`, `spectrum_ratio`, `cumulative_spectrum`, and of the model's filter `nis` and
+/// `whiteness`; Holm's adjustment over all tests and axes, p-values and effects to a verdict by [`effect::judge`].
+/// Inconclusive also when the log is too short to show the model's drift. `alpha` in (0, 1).
 ///
-/// Errors: another quantity, axes that cannot be told apart, a log too short or constant, a line of the model above half the log's rate,
-/// no random noise.
+/// Errors: another quantity, axes that cannot be told apart, a log too short or constant, a line of the model above
+/// half the log's rate, no random noise.
 pub fn compare(params: &Params, log: &Log, alpha: f64) -> Result<Comparison, CompareError> {
     check_alpha(alpha)?;
     let pairs = paired(params, log)?;
@@ -275,7 +278,8 @@ fn of_neighbours(model: &NoiseModel, log: &LogAxis) -> Option<String> {
     })
 }
 
-/// What another sample rate changes: terms that count samples are other processes at another rate, all others are continuous.
+/// What another sample rate changes: terms that count samples are other processes at another rate, all others are
+/// continuous.
 fn other_rate(params_hz: f64, log_hz: f64, model: &NoiseModel) -> Option<String> {
     if (log_hz / params_hz - 1.0).abs() <= RATE_TOLERANCE {
         return None;

@@ -1,8 +1,9 @@
 //! The numbers of a file beside those that a log gives, one by one.
 //!
-//! The log is identified by maximum likelihood with terms of its own choice. A file's white noise is held against all white noise of the log at low
-//! frequencies, a walk that is its only drift against the growth of the log's drift over short times, √(K² + Σ 2σ²/Tc), which is what such a walk stands
-//! for; what else the log's model has not, against a fit of the file's own terms.
+//! The log is identified by maximum likelihood with terms of its own choice. A file's white noise is held against
+//! all white noise of the log at low frequencies, a walk that is its only drift against the growth of the log's
+//! drift over short times, √(K² + Σ 2σ²/Tc), which is what such a walk stands for; what else the log's model has
+//! not, against a fit of the file's own terms.
 
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -19,7 +20,8 @@ use crate::units::{Unit, digits};
 pub struct Beside {
     /// Of the parameters.
     pub axis: String,
-    /// As in params.json; `wideband.density` is that of white, moving_average and band_limit together, where the file has one of the latter two.
+    /// As in params.json; `wideband.density` is that of white, moving_average and band_limit together, where the
+    /// file has one of the latter two.
     pub parameter: String,
     /// Of the values: that of the file.
     pub unit: String,
@@ -42,7 +44,8 @@ pub struct Beside {
 /// Fewest and most Gauss-Markov processes that a log can be asked for.
 const MOST_PROCESSES: usize = 3;
 
-/// Every noise parameter of every axis beside its estimate; `display`: unit of the log. Errors: as [`super::compare`], and a log that cannot be identified.
+/// Every noise parameter of every axis beside its estimate; `display`: unit of the log. Errors: as
+/// [`super::compare`], and a log that cannot be identified.
 pub fn parameters(params: &Params, log: &Log, display: &Unit) -> Result<Vec<Beside>, CompareError> {
     let dt = 1.0 / log.sample_rate_hz;
     let pairs = paired(params, log)?;

@@ -45,8 +45,8 @@ pub(super) struct Ratios {
 }
 
 impl Ratios {
-    /// Of segments of one length, tapered, together: those of one frequency one after the other, about it, as if the step were so many times finer. Each coefficient is
-    /// what it would be of a segment alone.
+    /// Of segments of one length, tapered, together: those of one frequency one after the other, about it, as if the
+    /// step were so many times finer. Each coefficient is what it would be of a segment alone.
     pub(super) fn of_segments(segments: &[Vec<f64>], dt: f64, model: &NoiseModel, from_hz: f64) -> Ratios {
         let each: Vec<Ratios> = segments.par_iter().map(|part| Ratios::new(part, dt, model, from_hz)).collect();
         let Some(Ratios { first, step_hz, values, .. }) = each.first() else {
@@ -116,8 +116,8 @@ impl Ratios {
     }
 }
 
-/// The tests `spectrum_ratio` (every band: level and shape at all frequencies) and `cumulative_spectrum` (shape, most of all of the
-/// high frequencies), on Whittle's approximation that the coefficients are independent.
+/// The tests `spectrum_ratio` (every band: level and shape at all frequencies) and `cumulative_spectrum` (shape,
+/// most of all of the high frequencies), on Whittle's approximation that the coefficients are independent.
 pub(super) fn spectrum(axis: &str, ratios: &Ratios, alpha: f64) -> (Vec<Band>, [Test; 2]) {
     let (bands, z, bound) = ratios.bands(alpha);
     let (at, shown) = farthest(&z, bound, &|i| bands[i].ratio);

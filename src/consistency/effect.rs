@@ -1,8 +1,8 @@
 //! How large a deviation is, beside how sure it is: the verdict on measured logs.
 //!
-//! On a million samples an exact test sees deviations that matter to nobody; on a minute of data it sees none. So each test
-//! carries an [`Effect`]: the size of the deviation in a unit that means something, its interval, and the range within which
-//! it does not matter (the tolerance, stated in the document).
+//! On a million samples an exact test sees deviations that matter to nobody; on a minute of data it sees none. So
+//! each test carries an [`Effect`]: the size of the deviation in a unit that means something, its interval, and the
+//! range within which it does not matter (the tolerance, stated in the document).
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -11,7 +11,8 @@ use super::{Test, Verdict, multiplicity};
 
 /// Relative deviation of the mean NIS from its expectation that is tolerated: ±10 %, that is 5 % in √S.
 pub const NIS_TOLERANCE: f64 = 0.10;
-/// Largest |autocorrelation| of the innovations that is tolerated: one lag of 0.1 predicts 1 % of the innovation variance.
+/// Largest |autocorrelation| of the innovations that is tolerated: one lag of 0.1 predicts 1 % of the innovation
+/// variance.
 pub const AUTOCORRELATION_TOLERANCE: f64 = 0.1;
 /// Share of the innovation variance that its own past predicts and that is tolerated: what a better model could gain.
 pub const PREDICTABLE_TOLERANCE: f64 = 0.03;
@@ -23,7 +24,8 @@ pub const PERIODOGRAM_TOLERANCE: f64 = 0.1;
 /// The size of a deviation.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Effect {
-    /// "relative_nis_deviation", "max_abs_autocorrelation", "predictable_share", "variance_ratio", "periodogram_distance".
+    /// "relative_nis_deviation", "max_abs_autocorrelation", "predictable_share", "variance_ratio",
+    /// "periodogram_distance".
     pub name: String,
     pub value: f64,
     /// Interval of confidence 1 − alpha.
@@ -50,12 +52,12 @@ impl Effect {
 ///
 /// 1. not significant (p̃ ≥ alpha): passes;
 /// 2. significant, and the effect's estimate beyond its tolerance (or a test without an effect): fails;
-/// 3. significant, the estimate within the tolerance: passes, since the deviation is real but small; if the interval still
-///    reaches beyond the tolerance, the log cannot tell whether it is small, and the test is undecided.
+/// 3. significant, the estimate within the tolerance: passes, since the deviation is real but small; if the interval
+///    still reaches beyond the tolerance, the log cannot tell whether it is small, and the test is undecided.
 ///
-/// Any failure makes the verdict inconsistent. Otherwise it is inconclusive when a test is undecided, has no numbers, or when
-/// `enough` is false (the log is too short for the drift to be judged); else consistent.
-/// Under a true design the probability of "inconsistent" is at most `alpha`; the effect can only lower it.
+/// Any failure makes the verdict inconsistent. Otherwise it is inconclusive when a test is undecided, has no
+/// numbers, or when `enough` is false (the log is too short for the drift to be judged); else consistent. Under a
+/// true design the probability of "inconsistent" is at most `alpha`; the effect can only lower it.
 pub fn judge(tests: &mut [Test], alpha: f64, enough: bool) -> Verdict {
     let beyond = |test: &Test| test.effect.as_ref().is_none_or(Effect::is_beyond);
     multiplicity::judge_each(tests, |test| test.adjusted_p_value >= alpha || !beyond(test));

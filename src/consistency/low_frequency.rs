@@ -1,10 +1,11 @@
 //! The low-frequency innovation test: what mean NIS at 100 Hz cannot see.
 //!
-//! Sampled fast, S is nearly R and the mean NIS says nothing about the bias model. A wrong drift shows in the innovations only below
-//! the filter's bandwidth. So the normalised innovations y are averaged over blocks of L samples: √L·ȳ is N(0, 1) exactly when the
-//! design is true, the sum of L ȳ² over n blocks is χ²(n), and its mean is the ratio of the innovation spectrum below about 1/(2L) to what
-//! the filter says. Lengths run from a quarter of the filter's time constant to several of it. Bartlett's cumulative periodogram of the block means
-//! looks at the shape of the same band.
+//! Sampled fast, S is nearly R and the mean NIS says nothing about the bias model. A wrong drift shows in the
+//! innovations only below the filter's bandwidth. So the normalised innovations y are averaged over blocks of L
+//! samples: √L·ȳ is N(0, 1) exactly when the design is true, the sum of L ȳ² over n blocks is χ²(n), and its mean is
+//! the ratio of the innovation spectrum below about 1/(2L) to what the filter says. Lengths run from a quarter of
+//! the filter's time constant to several of it. Bartlett's cumulative periodogram of the block means looks at the
+//! shape of the same band.
 
 use super::effect::{Effect, VARIANCE_RATIO_TOLERANCE};
 use super::normalized::mean_of_chi_squares;
@@ -22,9 +23,9 @@ const MOST_LENGTHS: usize = 8;
 /// Block means kept for the periodogram; when full, neighbours are merged and the blocks are twice as long.
 const KEPT_BLOCKS: usize = 16_384;
 
-/// Block lengths in samples for a filter with these closed-loop time constants (in samples): a quarter of the shortest, then
-/// four times longer each until sixteen times the longest is reached, at most eight; lengths of one sample are left to the NIS.
-/// Without time constants (a filter that follows no drift): 16, 64, … samples.
+/// Block lengths in samples for a filter with these closed-loop time constants (in samples): a quarter of the
+/// shortest, then four times longer each until sixteen times the longest is reached, at most eight; lengths of one
+/// sample are left to the NIS. Without time constants (a filter that follows no drift): 16, 64, … samples.
 pub fn block_lengths(time_constants: &[f64]) -> Vec<u64> {
     let usable = || time_constants.iter().copied().filter(|t| t.is_finite() && *t > 0.0);
     let shortest = usable().fold(f64::INFINITY, f64::min);
@@ -44,7 +45,8 @@ pub fn block_lengths(time_constants: &[f64]) -> Vec<u64> {
 
 /// Time constants in samples of closed-loop poles given as (re, im): −1/ln|λ| of those inside the unit circle.
 ///
-/// Poles on the circle belong to constants the filter has learnt for good; poles at zero have no memory. Neither counts.
+/// Poles on the circle belong to constants the filter has learnt for good; poles at zero have no memory. Neither
+/// counts.
 pub fn time_constants(poles: &[(f64, f64)]) -> Vec<f64> {
     poles
         .iter()
@@ -103,10 +105,10 @@ pub struct LowFrequency {
 }
 
 impl LowFrequency {
-    /// For a filter with these closed-loop time constants, in samples; see [`block_lengths`]. `gain` is that of the steady
-    /// filter from innovation to predicted measurement, H K: a filter averages over about 1/(H K) samples, whatever the number of
-    /// its states, and a log of [`ENOUGH_TIME_CONSTANTS`] times that is enough for a judgement. A filter without gain follows no
-    /// drift; for it the block lengths decide.
+    /// For a filter with these closed-loop time constants, in samples; see [`block_lengths`]. `gain` is that of the
+    /// steady filter from innovation to predicted measurement, H K: a filter averages over about 1/(H K) samples,
+    /// whatever the number of its states, and a log of [`ENOUGH_TIME_CONSTANTS`] times that is enough for a
+    /// judgement. A filter without gain follows no drift; for it the block lengths decide.
     pub fn new(time_constants: &[f64], gain: f64) -> LowFrequency {
         let mut low_frequency = LowFrequency::with_lengths(&block_lengths(time_constants));
         if gain > 1e-12 {
@@ -147,7 +149,8 @@ impl LowFrequency {
         self.count += 1;
     }
 
-    /// The lengths that have enough blocks, shortest first. `variance` is the mean of y² under the model: 1, or less behind a gate.
+    /// The lengths that have enough blocks, shortest first. `variance` is the mean of y² under the model: 1, or less
+    /// behind a gate.
     pub fn results(&self, variance: f64, alpha: f64) -> Vec<BlockResult> {
         self.blocks
             .iter()
@@ -156,7 +159,8 @@ impl LowFrequency {
             .collect()
     }
 
-    /// Cumulative periodogram of the shortest blocks (longer ones on a very long log), with the number of samples per block.
+    /// Cumulative periodogram of the shortest blocks (longer ones on a very long log), with the number of samples
+    /// per block.
     pub fn periodogram(&self, alpha: f64) -> Option<(u64, CumulativePeriodogram)> {
         cumulative_periodogram(&self.kept.values, alpha).map(|p| (self.kept.length, p))
     }

@@ -3,10 +3,10 @@
 //! Every test is two-sided: a covariance that is too large (a pessimistic filter) fails like one that is too small (an
 //! optimistic filter), and the sentence in [`Test::meaning`] says which of the two it is.
 //!
-//! The tests take *normalised* innovations y = ν/√S. For a filter whose model is true they are independent N(0, 1), so the
-//! null distribution of each statistic here is exact or has a stated approximation; see each function.
-//! NEES is correlated in time: use [`normalized::across_runs`] at one epoch, or [`normalized::over_time`] with its effective
-//! sample size, never χ² with one run's sample count.
+//! The tests take *normalised* innovations y = ν/√S. For a filter whose model is true they are independent N(0, 1),
+//! so the null distribution of each statistic here is exact or has a stated approximation; see each function. NEES
+//! is correlated in time: use [`normalized::across_runs`] at one epoch, or [`normalized::over_time`] with its
+//! effective sample size, never χ² with one run's sample count.
 
 pub mod effect;
 pub mod low_frequency;
@@ -115,8 +115,8 @@ pub struct Test {
     /// Of the kind, and of the measurement where there are several.
     pub name: String,
     pub statistic: f64,
-    /// replay: the statistic lies in [lower, upper] with probability 1 − alpha when the design is true (each test alone);
-    /// montecarlo: the bounds beyond which the gate rejects, all tests together.
+    /// replay: the statistic lies in [lower, upper] with probability 1 − alpha when the design is true (each test
+    /// alone); montecarlo: the bounds beyond which the gate rejects, all tests together.
     pub lower: f64,
     pub upper: f64,
     /// Two-sided.
@@ -136,8 +136,9 @@ pub struct Test {
 }
 
 impl Test {
-    /// A test not yet judged: `adjusted_p_value` is the p-value and it does not pass until [`multiplicity::judge`] or
-    /// [`effect::judge`] has seen all tests of the document. Without a number for its statistic or its p-value it means nothing, and says so.
+    /// A test not yet judged: `adjusted_p_value` is the p-value and it does not pass until [`multiplicity::judge`]
+    /// or [`effect::judge`] has seen all tests of the document. Without a number for its statistic or its p-value it
+    /// means nothing, and says so.
     pub fn new(axis: &str, kind: TestKind, statistic: f64, bounds: [f64; 2], p_value: f64, meaning: String) -> Test {
         let meaning = if statistic.is_finite() && !p_value.is_nan() { meaning } else { NO_NUMBER.to_string() };
         Test {

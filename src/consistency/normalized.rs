@@ -24,9 +24,11 @@ pub fn two_sided_p(x: f64, dof: f64) -> f64 {
     (2.0 * chi_square_cdf(x, dof).min(chi_square_sf(x, dof))).min(1.0)
 }
 
-/// The mean of `count` independent χ²(`dof`) values whose sum is `sum`: bounds χ²(α/2, dof·count)/count … χ²(1−α/2, dof·count)/count.
+/// The mean of `count` independent χ²(`dof`) values whose sum is `sum`: bounds χ²(α/2, dof·count)/count … χ²(1−α/2,
+/// dof·count)/count.
 ///
-/// NIS with m measurements has dof = m, NEES with n states dof = n. Source: Bar-Shalom, Li & Kirubarajan 2001, section 5.4.2.
+/// NIS with m measurements has dof = m, NEES with n states dof = n. Source: Bar-Shalom, Li & Kirubarajan 2001,
+/// section 5.4.2.
 pub fn mean_of_chi_squares(sum: f64, count: u64, dof: f64, alpha: f64) -> MeanTest {
     moment_matched(sum, count, dof, 2.0 * dof, alpha)
 }
@@ -38,8 +40,9 @@ pub fn across_runs(values: &[f64], dof: f64, alpha: f64) -> MeanTest {
 
 /// ANEES over `runs` independent runs of `epochs` correlated epochs each: χ² with dof·runs·n_eff degrees of freedom.
 ///
-/// `mean` is the mean NEES over all runs and epochs, `rho` the lag-one correlation of the NEES sequence (λ² for a closed-loop
-/// pole λ). Exact in mean and variance for one state; for several states with the slowest pole it is conservative.
+/// `mean` is the mean NEES over all runs and epochs, `rho` the lag-one correlation of the NEES sequence (λ² for a
+/// closed-loop pole λ). Exact in mean and variance for one state; for several states with the slowest pole it is
+/// conservative.
 pub fn over_time(mean: f64, runs: u64, epochs: u64, dof: f64, rho: f64, alpha: f64) -> MeanTest {
     let effective = runs as f64 * effective_samples(epochs, rho);
     let total = dof * effective;
@@ -75,7 +78,8 @@ pub fn effective_samples(n: u64, rho: f64) -> f64 {
     count / (1.0 + 2.0 * tail)
 }
 
-/// Mean and variance of y² for y ~ N(0, 1) truncated to |y| ≤ g: what the NIS of accepted innovations has behind a gate of g sigmas.
+/// Mean and variance of y² for y ~ N(0, 1) truncated to |y| ≤ g: what the NIS of accepted innovations has behind a
+/// gate of g sigmas.
 ///
 /// E(y²) = 1 − 2gφ(g)/p and E(y⁴) = 3 − 2(g³ + 3g)φ(g)/p with p = P(|y| ≤ g).
 pub fn gated_moments(gate: f64) -> (f64, f64) {
@@ -86,8 +90,8 @@ pub fn gated_moments(gate: f64) -> (f64, f64) {
     (second, fourth - second * second)
 }
 
-/// Mean of `count` independent non-negative values with known mean and variance each: bounds by the scaled chi-square with
-/// the same two moments (exact when the values are χ², an approximation of order 1/count otherwise).
+/// Mean of `count` independent non-negative values with known mean and variance each: bounds by the scaled
+/// chi-square with the same two moments (exact when the values are χ², an approximation of order 1/count otherwise).
 pub fn moment_matched(sum: f64, count: u64, mean: f64, variance: f64, alpha: f64) -> MeanTest {
     let n = count as f64;
     // c·χ²(d) with c·d = n·mean and 2c²·d = n·variance
@@ -130,8 +134,8 @@ impl MeanTest {
         Test::new(axis, TestKind::Nees, self.mean, [self.lower, self.upper], self.p_value, meaning)
     }
 
-    /// The test record of a mean NIS; `deviation_error` is the standard error of the mean estimated from the data themselves
-    /// (their own spread and correlation), `alpha` the level of the effect's interval.
+    /// The test record of a mean NIS; `deviation_error` is the standard error of the mean estimated from the data
+    /// themselves (their own spread and correlation), `alpha` the level of the effect's interval.
     pub fn nis(&self, axis: &str, deviation_error: f64, alpha: f64) -> Test {
         let deviation = self.mean / self.expected - 1.0;
         let half_width = normal_quantile(1.0 - alpha / 2.0) * deviation_error / self.expected;

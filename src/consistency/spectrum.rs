@@ -14,11 +14,11 @@ pub struct Departure {
     pub p_value: f64,
 }
 
-/// `parts`: neighbouring cosine coefficients by increasing frequency, each part with their number and the sum of u_j = P_j/S_j, P the power
-/// of the log and S the spectrum of the model.
+/// `parts`: neighbouring cosine coefficients by increasing frequency, each part with their number and the sum of u_j =
+/// P_j/S_j, P the power of the log and S the spectrum of the model.
 ///
-/// If the model is true up to a factor, u_j ~ χ²₁ are independent and D √(n/2) has Kolmogorov's law. Blind to the factor, and nearly
-/// blind to low frequencies, which are few of all. Source: Bartlett 1954.
+/// If the model is true up to a factor, u_j ~ χ²₁ are independent and D √(n/2) has Kolmogorov's law. Blind to the
+/// factor, and nearly blind to low frequencies, which are few of all. Source: Bartlett 1954.
 pub fn departure(parts: &[(f64, f64)]) -> Departure {
     let (count, total) = parts.iter().fold((0.0, 0.0), |(n, sum), (size, u)| (n + size, sum + u));
     let (mut sum, mut before) = (0.0, 0.0);

@@ -1,4 +1,5 @@
-//! Is the innovation sequence white? Streaming autocorrelation, Ljung-Box, the largest lag, and Bartlett's cumulative periodogram.
+//! Is the innovation sequence white? Streaming autocorrelation, Ljung-Box, the largest lag, and Bartlett's
+//! cumulative periodogram.
 
 use super::effect::{AUTOCORRELATION_TOLERANCE, Effect, PERIODOGRAM_TOLERANCE, PREDICTABLE_TOLERANCE};
 use super::{Test, TestKind};
@@ -9,8 +10,8 @@ use crate::units::digits;
 
 /// Sums for the autocorrelation of a sequence at lags 1..=L, in one pass with memory for L samples.
 ///
-/// The mean is taken as zero, as it is for the innovations of a true design; an offset shows as correlation at all lags.
-/// Missing samples keep their place in time: a lag is always that many sample intervals.
+/// The mean is taken as zero, as it is for the innovations of a true design; an offset shows as correlation at all
+/// lags. Missing samples keep their place in time: a lag is always that many sample intervals.
 #[derive(Clone, Debug)]
 pub struct Autocorrelation {
     /// The last L samples twice in a row, so that the newest L are always one slice; 0 where a sample is missing.
@@ -156,7 +157,8 @@ fn largest_abs(values: &[f64]) -> (usize, f64) {
 
 /// n·var(r_h) of a linear process with autocorrelations r at lags 1..=L (zero beyond), h = `at` + 1.
 ///
-/// Σ_j [r_j² + r_{j+h} r_{j−h} − 4 r_h r_j r_{j−h} + 2 r_h² r_j²] over all j. Source: Bartlett 1946; Brockwell & Davis 1991, eq. 7.2.5.
+/// Σ_j [r_j² + r_{j+h} r_{j−h} − 4 r_h r_j r_{j−h} + 2 r_h² r_j²] over all j. Source: Bartlett 1946; Brockwell &
+/// Davis 1991, eq. 7.2.5.
 fn bartlett_variance(r: &[f64], at: usize) -> f64 {
     let h = at as i64 + 1;
     let reach = r.len() as i64;
@@ -181,7 +183,8 @@ pub struct Whiteness {
     pub lags: usize,
     /// Autocorrelation at lags 1..=lags, mean taken as zero.
     pub autocorrelation: Vec<f64>,
-    /// Largest |r_h|·√(n(n+2)/(pairs at h))/n, and its lag: standard normal at each lag under the model, exactly of unit variance.
+    /// Largest |r_h|·√(n(n+2)/(pairs at h))/n, and its lag: standard normal at each lag under the model, exactly of
+    /// unit variance.
     pub largest_normalised: f64,
     pub lag: usize,
     /// Šidák bound of `largest_normalised` at level alpha.
@@ -190,9 +193,11 @@ pub struct Whiteness {
     /// Largest |r_h| and its lag.
     pub max_abs_autocorrelation: f64,
     pub max_lag: usize,
-    /// Contains max_h |ρ_h| with confidence 1 − alpha: |r| ± the simultaneous half width over all lags, Bartlett's variance.
+    /// Contains max_h |ρ_h| with confidence 1 − alpha: |r| ± the simultaneous half width over all lags, Bartlett's
+    /// variance.
     pub interval: [f64; 2],
-    /// Q = n(n+2) Σ r_h²/(n−h), with the number of pairs where samples are missing; χ²(lags) under the model. Source: Ljung & Box 1978.
+    /// Q = n(n+2) Σ r_h²/(n−h), with the number of pairs where samples are missing; χ²(lags) under the model.
+    /// Source: Ljung & Box 1978.
     pub ljung_box: f64,
     pub ljung_box_lower: f64,
     pub ljung_box_upper: f64,
@@ -252,10 +257,11 @@ impl Whiteness {
         [largest, together]
     }
 
-    /// Share of the innovation variance that its own past predicts, s/(1 + s) with s = Σ ρ_h² over the lags, and its interval.
+    /// Share of the innovation variance that its own past predicts, s/(1 + s) with s = Σ ρ_h² over the lags, and its
+    /// interval.
     ///
-    /// Exact for a first-order autoregression, of first order in s otherwise. Q is noncentral χ²(lags, n·s), and √Q is close to
-    /// N(√(lags − ½ + n·s), 1) (Fisher 1928, extended).
+    /// Exact for a first-order autoregression, of first order in s otherwise. Q is noncentral χ²(lags, n·s), and √Q
+    /// is close to N(√(lags − ½ + n·s), 1) (Fisher 1928, extended).
     fn predictable_share(&self, alpha: f64) -> (f64, [f64; 2]) {
         let n = self.samples as f64;
         let root = self.ljung_box.sqrt();
@@ -287,9 +293,10 @@ pub struct CumulativePeriodogram {
 
 /// Tests a series for whiteness by its cumulative periodogram: U_j = Σ_{i≤j} I_i / Σ I against j/m.
 ///
-/// For Gaussian white noise the ordinates are independent exponentials, so U_1..U_{m−1} are the order statistics of m − 1 uniform
-/// numbers and the distance is Kolmogorov's, here with Stephens' factor √k + 0.12 + 0.11/√k, k = m − 1. `None` below 8 ordinates or
-/// for a series without power. Sources: Bartlett 1955; Durbin 1969, Biometrika 56; Stephens 1970, JRSS B 32.
+/// For Gaussian white noise the ordinates are independent exponentials, so U_1..U_{m−1} are the order statistics of
+/// m − 1 uniform numbers and the distance is Kolmogorov's, here with Stephens' factor √k + 0.12 + 0.11/√k, k = m − 1.
+/// `None` below 8 ordinates or for a series without power. Sources: Bartlett 1955; Durbin 1969, Biometrika 56;
+/// Stephens 1970, JRSS B 32.
 pub fn cumulative_periodogram(series: &[f64], alpha: f64) -> Option<CumulativePeriodogram> {
     let n = series.len();
     let ordinates = n.saturating_sub(1) / 2;
@@ -375,7 +382,8 @@ impl CumulativePeriodogram {
 mod tests {
     use super::bartlett_variance;
 
-    /// AR(1): n·var(r_h) = (1 + φ²)(1 − φ^2h)/(1 − φ²) − 2hφ^2h (Brockwell & Davis 1991, example 7.2.3); white noise: 1.
+    /// AR(1): n·var(r_h) = (1 + φ²)(1 − φ^2h)/(1 − φ²) − 2hφ^2h (Brockwell & Davis 1991, example 7.2.3); white
+    /// noise: 1.
     #[test]
     fn bartlett_variance_of_an_autoregression() {
         let phi = 0.5_f64;

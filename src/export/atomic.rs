@@ -47,14 +47,16 @@ pub fn check_output(output: &Path) -> Result<(), WriteError> {
     Ok(())
 }
 
-/// The temporary files that are there now. Held while one is made, moved or removed, so that who holds it knows them all.
+/// The temporary files that are there now. Held while one is made, moved or removed, so that who holds it knows them
+/// all.
 static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// For a process that ends at a signal: removes every temporary file and lets no other come to be, nor any reach its place.
+/// For a process that ends at a signal: removes every temporary file and lets no other come to be, nor any reach its
+/// place.
 pub fn abandon() {
     let files = unfinished();
     files.iter().for_each(|file| drop(fs::remove_file(file)));
@@ -92,7 +94,8 @@ impl Drop for Unfinished {
     }
 }
 
-/// A file in the making; nothing appears at its path before [`AtomicFile::commit`], and a dropped one leaves nothing behind.
+/// A file in the making; nothing appears at its path before [`AtomicFile::commit`], and a dropped one leaves nothing
+/// behind.
 ///
 /// A path that is no regular file (`/dev/null`, a pipe) is written directly: there is nothing to rename over.
 #[derive(Debug)]
@@ -149,8 +152,8 @@ impl AtomicFile {
         patched.map(|_| ()).map_err(|e| self.told(&e))
     }
 
-    /// Moves the finished file to its place, with the mode of the file that was there. It is on the disk before it has its name, so that
-    /// also after a power failure the old file is there or the whole new one.
+    /// Moves the finished file to its place, with the mode of the file that was there. It is on the disk before it
+    /// has its name, so that also after a power failure the old file is there or the whole new one.
     pub fn commit(self) -> Result<(), WriteError> {
         let path = self.path;
         let done = match self.target {
@@ -238,7 +241,8 @@ pub(super) fn io_error(path: &Path, error: &io::Error) -> WriteError {
     )
 }
 
-/// What the operating system says of a write that failed, without its number, and without the random name that a temporary file's error has.
+/// What the operating system says of a write that failed, without its number, and without the random name that a
+/// temporary file's error has.
 pub fn in_words(error: &io::Error) -> String {
     match error.kind() {
         ErrorKind::StorageFull => "no space is left on the disk".into(),
@@ -310,7 +314,8 @@ mod tests {
         assert!(refuse_input_as_output(&folder.path().join("new.csv"), &log).is_ok());
     }
 
-    /// A link to a name without a file makes that file and stays a link; one that leads to itself, or into no folder, is told.
+    /// A link to a name without a file makes that file and stays a link; one that leads to itself, or into no
+    /// folder, is told.
     #[cfg(unix)]
     #[test]
     fn a_link_to_nothing_is_followed() {

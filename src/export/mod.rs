@@ -1,4 +1,5 @@
-//! Getting results out (floor 6): tables as csv, csv.gz and npy, test reports, parameter files for other programs, a filter as source code, written atomically.
+//! Getting results out (floor 6): tables as csv, csv.gz and npy, test reports, parameter files for other programs, a
+//! filter as source code, written atomically.
 
 pub mod atomic;
 pub mod code;

@@ -56,7 +56,8 @@ pub fn check_ending(path: &Path) -> Result<(), WriteError> {
 }
 
 impl TableWriter {
-    /// `header`: column names with units, e.g. `gyro_x (deg/s)`. For npy: a structured 1-D array of f8 fields with these names.
+    /// `header`: column names with units, e.g. `gyro_x (deg/s)`. For npy: a structured 1-D array of f8 fields with
+    /// these names.
     pub fn create(path: &Path, header: &[String]) -> Result<TableWriter, WriteError> {
         let format = format_of(path)?;
         if header.is_empty() {

@@ -8,8 +8,9 @@ use crate::model::LinearModel;
 
 /// x ← F x + G u, x ← x + K_i ν: a gain per measurement, that of a sample at which all are taken, one after the other.
 ///
-/// Where measurements have several rates the true gains differ a little from sample to sample. A state that nothing drives (a constant bias) has gain
-/// zero and keeps its x0; until the filter has settled its error is larger than the sigma it claims, that of the steady state.
+/// Where measurements have several rates the true gains differ a little from sample to sample. A state that nothing
+/// drives (a constant bias) has gain zero and keeps its x0; until the filter has settled its error is larger than
+/// the sigma it claims, that of the steady state.
 #[derive(Clone, Debug)]
 pub struct ConstantGain {
     /// Holds x, and the claimed P.

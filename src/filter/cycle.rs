@@ -1,4 +1,5 @@
-//! Measurements at several rates: after how many samples their pattern repeats, and what one such period does to a covariance.
+//! Measurements at several rates: after how many samples their pattern repeats, and what one such period does to a
+//! covariance.
 
 use nalgebra::DMatrix;
 

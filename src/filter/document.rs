@@ -18,8 +18,8 @@ use crate::units::Quantity;
 impl FilterDesign {
     /// Reads filter.json and checks it; every complaint names `path` and the key.
     ///
-    /// `steady_state`, `tuning`, `noise`, `inputs` and `G` may be left out (the steady state is then computed); a steady
-    /// state that does not belong to the matrices is refused.
+    /// `steady_state`, `tuning`, `noise`, `inputs` and `G` may be left out (the steady state is then computed); a
+    /// steady state that does not belong to the matrices is refused.
     pub fn from_json(text: &str, path: &str) -> Result<FilterDesign, FilterError> {
         let value = place::parse(text).map_err(|e| FilterError::Syntax {
             path: path.into(),
@@ -198,7 +198,8 @@ struct SteadyStateDocument {
     predicted_covariance: Matrix,
     /// S.
     innovation_covariance: Matrix,
-    /// Eigenvalues of (I - K H) F as [re, im]; with a longer period the principal roots, per sample, of those of a whole period.
+    /// Eigenvalues of (I - K H) F as [re, im]; with a longer period the principal roots, per sample, of those of a
+    /// whole period.
     poles: Vec<[f64; 2]>,
     /// Four time constants of the slowest closed-loop pole of the driven states.
     #[schemars(with = "Measured")]

@@ -1,4 +1,5 @@
-//! The gains of a time-invariant model: they do not depend on the data, so they are computed once and shared by many runs.
+//! The gains of a time-invariant model: they do not depend on the data, so they are computed once and shared by many
+//! runs.
 
 use nalgebra::{DMatrix, DVector, RowDVector};
 
@@ -8,8 +9,8 @@ use crate::model::LinearModel;
 
 /// Gains, innovation weights and covariances of a filter from its first measurement on.
 ///
-/// Measurements of one step are taken one after the other (R is diagonal), so an update is a gain vector K and 1/√S. Updates are in the
-/// order they happen: by step, then by measurement.
+/// Measurements of one step are taken one after the other (R is diagonal), so an update is a gain vector K and 1/√S.
+/// Updates are in the order they happen: by step, then by measurement.
 #[derive(Clone, Debug)]
 pub struct GainSequence {
     pub steps: u64,
@@ -37,7 +38,8 @@ pub struct Epoch {
 }
 
 impl GainSequence {
-    /// Runs the covariance recursion of `model` for `steps` steps; `epochs` are steps in increasing order, each below `steps`.
+    /// Runs the covariance recursion of `model` for `steps` steps; `epochs` are steps in increasing order, each
+    /// below `steps`.
     pub fn new(model: &LinearModel, steps: u64, epochs: &[u64]) -> GainSequence {
         let n = model.x0.len();
         let every: Vec<u64> = model.every.iter().map(|&e| e as u64).collect();

@@ -49,8 +49,8 @@ pub fn nearest_turn(z: f64, expected: f64) -> f64 {
 
 /// Runs a filter over the first `rows` rows and hands out every update with its row and measurement.
 ///
-/// The sensor is the input, held over gaps, or else the first measurement, taken at its every n-th sample; aids are taken where they are
-/// finite. Measured angles are taken modulo a turn.
+/// The sensor is the input, held over gaps, or else the first measurement, taken at its every n-th sample; aids are
+/// taken where they are finite. Measured angles are taken modulo a turn.
 pub fn run(model: &LinearModel, log: &SensorLog, rows: usize, mut visit: impl FnMut(usize, usize, &Update)) {
     let mut kalman = Kalman::new(model);
     let own = usize::from(model.inputs.is_empty());
@@ -90,8 +90,8 @@ pub fn log_likelihood(model: &LinearModel, log: &SensorLog, rows: usize) -> f64 
 
 /// The same of several models.
 ///
-/// For a sensor at rest with a constant bias the same numbers by filters without that state, whose gains settle, eight at once: some fifty
-/// times faster.
+/// For a sensor at rest with a constant bias the same numbers by filters without that state, whose gains settle,
+/// eight at once: some fifty times faster.
 pub fn log_likelihoods(models: &[LinearModel], log: &SensorLog, rows: usize) -> Vec<f64> {
     let at_rest: Option<Vec<_>> =
         models.iter().map(|model| without_bias(model).filter(|_| log.aids.is_empty())).collect();
@@ -108,7 +108,8 @@ pub fn log_likelihoods(models: &[LinearModel], log: &SensorLog, rows: usize) -> 
     models.par_iter().map(one_by_one).collect()
 }
 
-/// The model without its constant bias, and mean and variance of that before the log; `None` where it has none, or is more than a sensor at rest.
+/// The model without its constant bias, and mean and variance of that before the log; `None` where it has none, or
+/// is more than a sensor at rest.
 fn without_bias(model: &LinearModel) -> Option<(LinearModel, [f64; 2])> {
     let n = model.states.len();
     let b = model.states.iter().position(|state| state.name == "bias")?;

@@ -8,7 +8,8 @@ use crate::numerics::linalg::cholesky;
 
 /// The estimation error that is judged: e = A x_truth − B x_filter with the claimed covariance B P Bᵀ.
 ///
-/// Every state when filter and truth have the same states; else the whole measured output H x, the one thing both speak of.
+/// Every state when filter and truth have the same states; else the whole measured output H x, the one thing both
+/// speak of.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Judge {
     /// Name and unit of each component of e.
@@ -20,8 +21,8 @@ pub struct Judge {
 }
 
 impl Judge {
-    /// All states, unless the models differ in their states or the filter knows some state exactly at one of `epochs` (no NEES of all states
-    /// exists then).
+    /// All states, unless the models differ in their states or the filter knows some state exactly at one of
+    /// `epochs` (no NEES of all states exists then).
     pub fn new(filter: &LinearModel, truth: &LinearModel, epochs: &[Epoch]) -> Judge {
         let same = filter.states == truth.states && filter.h == truth.h;
         if same && epochs.iter().all(|epoch| cholesky(&epoch.covariance).is_ok()) {
@@ -54,8 +55,8 @@ impl Judge {
         &self.of_truth * DVector::from_column_slice(truth) - &self.of_estimate * DVector::from_column_slice(estimate)
     }
 
-    /// L⁻¹ of the claimed covariance L Lᵀ: turns the error of a true filter into independent N(0, 1). `None` where some component is
-    /// known exactly.
+    /// L⁻¹ of the claimed covariance L Lᵀ: turns the error of a true filter into independent N(0, 1). `None` where
+    /// some component is known exactly.
     pub fn whitening(&self, p: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let l = cholesky(&self.claimed(p)).ok()?;
         l.solve_lower_triangular(&DMatrix::identity(l.nrows(), l.nrows()))

@@ -15,7 +15,8 @@ const LONGEST_HELD: u64 = 1_000_000;
 
 /// State of a running filter.
 ///
-/// `x` and `p` are x(k|k−1), P(k|k−1) after [`predict`](Kalman::predict) and x(k|k), P(k|k) after [`update`](Kalman::update).
+/// `x` and `p` are x(k|k−1), P(k|k−1) after [`predict`](Kalman::predict) and x(k|k), P(k|k) after
+/// [`update`](Kalman::update).
 #[derive(Clone, Debug)]
 pub struct Kalman {
     pub x: DVector<f64>,
@@ -44,8 +45,8 @@ struct Scratch {
 impl Kalman {
     /// Starts at x0, P0.
     ///
-    /// Measurements are taken one at a time, so R must be diagonal (its diagonal is used).
-    /// Panics when the model's matrices do not fit each other; [`FilterDesign`](super::FilterDesign) checks what it reads.
+    /// Measurements are taken one at a time, so R must be diagonal (its diagonal is used). Panics when the model's
+    /// matrices do not fit each other; [`FilterDesign`](super::FilterDesign) checks what it reads.
     pub fn new(model: &LinearModel) -> Kalman {
         let n = model.x0.len();
         let m = model.h.nrows();
@@ -105,15 +106,16 @@ impl Kalman {
         }
     }
 
-    /// x ← x + G u: after [`predict`](Kalman::predict), what the inputs of the sample before have done. Inputs are known exactly: the
-    /// noise of a sensor at an input is part of Q.
+    /// x ← x + G u: after [`predict`](Kalman::predict), what the inputs of the sample before have done. Inputs are
+    /// known exactly: the noise of a sensor at an input is part of Q.
     pub fn drive(&mut self, u: &[f64]) {
         for (column, u) in self.g.column_iter().zip(u) {
             self.x.axpy(*u, &column, 1.0);
         }
     }
 
-    /// So many predictions, an input keeping its value; a gap of a million samples or more has lost an integrated input whatever it was.
+    /// So many predictions, an input keeping its value; a gap of a million samples or more has lost an integrated
+    /// input whatever it was.
     pub fn advance(&mut self, steps: u64, input: Option<f64>) {
         match (steps, input) {
             (1, None) => self.predict(),
@@ -183,8 +185,8 @@ impl Kalman {
 }
 
 impl Kalman {
-    /// x ← x + K ν with the gain of measurement `index`, P as it is: what is left of a measurement too far out to be believed whole.
-    /// Source: Masreliez and Martin 1977, section IV, with Huber's clipped score.
+    /// x ← x + K ν with the gain of measurement `index`, P as it is: what is left of a measurement too far out to be
+    /// believed whole. Source: Masreliez and Martin 1977, section IV, with Huber's clipped score.
     pub fn nudge(&mut self, index: usize, innovation: f64) {
         let h = self.h_columns.column(index);
         let direction = &self.p * h;

@@ -1,7 +1,8 @@
-//! Steps of filters too large for registers: everything by columns, whose numbers stand side by side, compiled for each instruction set.
+//! Steps of filters too large for registers: everything by columns, whose numbers stand side by side, compiled for
+//! each instruction set.
 //!
-//! Operations and their order are the same for all of them, and so are the bits. Only one triangle of P is computed, so it stays exactly
-//! symmetric.
+//! Operations and their order are the same for all of them, and so are the bits. Only one triangle of P is computed,
+//! so it stays exactly symmetric.
 
 use pulp::{Arch, NullaryFnOnce};
 

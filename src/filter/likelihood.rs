@@ -1,4 +1,5 @@
-//! Exact Gaussian likelihood of a log whose constant bias (and slope) is unknown or known to some precision, gaps included.
+//! Exact Gaussian likelihood of a log whose constant bias (and slope) is unknown or known to some precision, gaps
+//! included.
 
 mod bank;
 mod lane;
@@ -32,28 +33,31 @@ pub struct LogLikelihood {
     pub bias_variance: f64,
 }
 
-/// ln L of z_k = b + a (t_k − t_mid) + h x_k + v_k, b (and a, with `slope`) unknown with a flat prior, x the states of `model`, which has one
-/// measurement and no state for b:
+/// ln L of z_k = b + a (t_k − t_mid) + h x_k + v_k, b (and a, with `slope`) unknown with a flat prior, x the states
+/// of `model`, which has one measurement and no state for b:
 ///
-/// ln L = −½ [n ln 2π + Σ ln S_k + ν̃ᵀ S⁻¹ ν̃ + ln det A], A = Uᵀ S⁻¹ U, with U the innovations of the filter on the regressors (1 and t_k − t_mid),
-/// ν̃ what is left of those of the log after least squares on U. This is the diffuse likelihood of a filter with states for b and a.
+/// ln L = −½ [n ln 2π + Σ ln S_k + ν̃ᵀ S⁻¹ ν̃ + ln det A], A = Uᵀ S⁻¹ U, with U the innovations of the filter on the
+/// regressors (1 and t_k − t_mid), ν̃ what is left of those of the log after least squares on U. This is the diffuse
+/// likelihood of a filter with states for b and a.
 ///
-/// The filter predicts over missing samples and over samples that are not finite. Units: SI. NaN when nothing can be said (fewer usable samples
-/// than unknowns). Sources: Rosenberg 1973; Durbin & Koopman 2012, sections 5.6 and 7.2.
+/// The filter predicts over missing samples and over samples that are not finite. Units: SI. NaN when nothing can be
+/// said (fewer usable samples than unknowns). Sources: Rosenberg 1973; Durbin & Koopman 2012, sections 5.6 and 7.2.
 pub fn diffuse_log_likelihood(model: &LinearModel, log: &[Stretch<'_>], slope: bool) -> LogLikelihood {
     diffuse_log_likelihoods(std::slice::from_ref(model), log, slope)[0]
 }
 
-/// The same of several models: eight neighbours of equally many states go through the log together, for little more than one costs.
+/// The same of several models: eight neighbours of equally many states go through the log together, for little more
+/// than one costs.
 ///
-/// The covariance of each is carried until it no longer moves (in all eight), then their gains are constant. Lanes do not mix but
-/// for that moment, so a number depends on its companions by rounding alone.
+/// The covariance of each is carried until it no longer moves (in all eight), then their gains are constant. Lanes
+/// do not mix but for that moment, so a number depends on its companions by rounding alone.
 pub fn diffuse_log_likelihoods(models: &[LinearModel], log: &[Stretch<'_>], slope: bool) -> Vec<LogLikelihood> {
     likelihoods(models, log, slope, &[])
 }
 
-/// The same with b ~ N(mean, variance), one pair per model, and no slope: A has 1/variance more and ln L has −½ ln variance, the likelihood of a
-/// filter with a constant state for b. `bias` and its variance are those after the log.
+/// The same with b ~ N(mean, variance), one pair per model, and no slope: A has 1/variance more and ln L has −½ ln
+/// variance, the likelihood of a filter with a constant state for b. `bias` and its variance are those after the
+/// log.
 pub fn log_likelihoods_with_bias(
     models: &[LinearModel],
     log: &[Stretch<'_>],

@@ -1,8 +1,9 @@
-//! What a filter does on average in a world that is not the one it was designed for: exact means and covariances, no simulation.
+//! What a filter does on average in a world that is not the one it was designed for: exact means and covariances, no
+//! simulation.
 //!
-//! Filter and truth are linear and the gains do not depend on the data, so the joint state of both is Gaussian and its first two
-//! moments follow from a linear recursion. Source: Brown and Hwang 2012, section 5.6 (suboptimal analysis);
-//! Gelb 1974, section 7.2 (sensitivity of the error covariance to a wrong model).
+//! Filter and truth are linear and the gains do not depend on the data, so the joint state of both is Gaussian and
+//! its first two moments follow from a linear recursion. Source: Brown and Hwang 2012, section 5.6 (suboptimal
+//! analysis); Gelb 1974, section 7.2 (sensitivity of the error covariance to a wrong model).
 
 mod settled;
 
@@ -43,7 +44,8 @@ pub struct ExpectedInnovations {
     pub nis: f64,
     /// Mean over the updates of `E[y]`.
     pub mean: f64,
-    /// For each block length L: mean over the complete blocks of E[(Σ y)²/L], 1 when the filter is right; NaN when no block is complete.
+    /// For each block length L: mean over the complete blocks of E[(Σ y)²/L], 1 when the filter is right; NaN when
+    /// no block is complete.
     pub blocks: Vec<f64>,
 }
 
@@ -71,17 +73,18 @@ impl ExpectedError {
 
 /// First and second moments of the errors and innovations of `filter`, run with `gains` in the world `truth`.
 ///
-/// x_truth(0) ~ N(x0, P0) of the truth, x_filter(0) = x0 of the filter exactly, no prediction before the first measurement; then predict, update.
-/// `gains` belong to `filter`; `block_lengths` has one list per measurement, in samples of that measurement, each at least 1.
-/// The two models must agree in dt and in their measurements (number, order and `every`), which the caller checks.
+/// x_truth(0) ~ N(x0, P0) of the truth, x_filter(0) = x0 of the filter exactly, no prediction before the first
+/// measurement; then predict, update. `gains` belong to `filter`; `block_lengths` has one list per measurement, in
+/// samples of that measurement, each at least 1. The two models must agree in dt and in their measurements (number,
+/// order and `every`), which the caller checks.
 ///
-/// With T picking the states of the same name, the joint state is s = [x; e], x those states of the truth that reach the filter's
-/// error, e = T x_truth − x_filter:
+/// With T picking the states of the same name, the joint state is s = [x; e], x those states of the truth that reach
+/// the filter's error, e = T x_truth − x_filter:
 ///
 ///   e ← F e + (T F_truth − F T) x + T v,   ν = h e + (h_truth − h T) x + w,   e ← e − K ν.
 ///
-/// Any T gives the same result; this one keeps small errors of large states exact and drops x wholly when only noise levels or P0 differ.
-/// A block sum a ← a + ν/√S is carried by its variance and its covariance with s.
+/// Any T gives the same result; this one keeps small errors of large states exact and drops x wholly when only noise
+/// levels or P0 differ. A block sum a ← a + ν/√S is carried by its variance and its covariance with s.
 pub fn expect(
     filter: &LinearModel,
     truth: &LinearModel,
@@ -103,7 +106,8 @@ struct Joint {
     size: usize,
     /// Where e begins in s.
     error_at: usize,
-    /// Diagonal of the transition Φ, the outer product of it with itself, and the entries beside it as (row, column, value).
+    /// Diagonal of the transition Φ, the outer product of it with itself, and the entries beside it as (row, column,
+    /// value).
     diagonal: Vec<f64>,
     growth: Vec<f64>,
     coupling: Vec<(usize, usize, f64)>,
@@ -343,8 +347,8 @@ fn predict(n: usize, joint: &Joint, columns: &mut [f64], before: &mut [f64]) {
 
 /// ν = c s + w with var w = r, then s ← s + k ν and a ← a + ν·weight for every block sum of this measurement.
 ///
-/// Every column takes (I + k cᵀ) from the left, E[s] among them; then cov(s, ν) = p goes to the columns of all that ν was added to:
-/// C ← (I + k cᵀ) C (I + k cᵀ)ᵀ + k r kᵀ, the form of Bucy and Joseph.
+/// Every column takes (I + k cᵀ) from the left, E[s] among them; then cov(s, ν) = p goes to the columns of all that
+/// ν was added to: C ← (I + k cᵀ) C (I + k cᵀ)ᵀ + k r kᵀ, the form of Bucy and Joseph.
 #[inline(always)]
 fn update(n: usize, c: &[f64], r: f64, weight: f64, columns: &mut [f64], watched: &mut Watched, scratch: &mut Scratch) {
     let (c, k, p) = (&c[..n], &scratch.k[..n], &mut scratch.p[..n]);

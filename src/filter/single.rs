@@ -1,8 +1,9 @@
 //! What single precision costs: the same filter in f32 beside the one in f64, on the same measurements.
 //!
-//! The measurements are drawn from the f64 filter's own prediction, z = H x + ν, ν ~ N(0, S), which is the law they have when the model is true.
-//! The f64 estimate is then the conditional mean, its error is orthogonal to everything made of the measurements, and so the error of
-//! an f32 filter whose estimate differs by d has the variance `P + E[d²]`.
+//! The measurements are drawn from the f64 filter's own prediction, z = H x + ν, ν ~ N(0, S), which is the law they
+//! have when the model is true. The f64 estimate is then the conditional mean, its error is orthogonal to everything
+//! made of the measurements, and so the error of an f32 filter whose estimate differs by d has the variance `P +
+//! E[d²]`.
 
 use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
@@ -29,7 +30,8 @@ pub enum SingleForm {
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct SingleResult {
     pub form: SingleForm,
-    /// Root mean square error over that of the f64 filter, `√(1 + E[d²]/P)`, of each state over the second half of the run.
+    /// Root mean square error over that of the f64 filter, `√(1 + E[d²]/P)`, of each state over the second half of
+    /// the run.
     pub error: Vec<f64>,
     /// Claimed sigma over that of the f64 filter, at the end.
     pub claimed: Vec<f64>,

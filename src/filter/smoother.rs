@@ -1,9 +1,11 @@
-//! Fixed-interval smoothing: estimates of every sample from the whole log, those of Rauch, Tung & Striebel, by the adjoint form.
+//! Fixed-interval smoothing: estimates of every sample from the whole log, those of Rauch, Tung & Striebel, by the
+//! adjoint form.
 //!
-//! Backwards from λ = 0, Λ = 0 after the last measurement: x(k|N) = x(k|k) − P(k|k) λ, P(k|N) = P(k|k) − P(k|k) Λ P(k|k); through a scalar measurement
-//! with C = I − K h: λ ← Cᵀλ − hᵀ ν/s, Λ ← CᵀΛC + hᵀh/s; through a prediction: λ ← Fᵀλ, Λ ← FᵀΛF. No covariance is inverted, so that constants,
-//! gaps and exactly known states need no exception. Memory: the filter is run twice, the second time in stretches of √N rows.
-//! Sources: Rauch, Tung & Striebel 1965, AIAA J. 3; Bierman 1973, Automatica 9 (the adjoint form).
+//! Backwards from λ = 0, Λ = 0 after the last measurement: x(k|N) = x(k|k) − P(k|k) λ, P(k|N) = P(k|k) − P(k|k) Λ
+//! P(k|k); through a scalar measurement with C = I − K h: λ ← Cᵀλ − hᵀ ν/s, Λ ← CᵀΛC + hᵀh/s; through a prediction:
+//! λ ← Fᵀλ, Λ ← FᵀΛF. No covariance is inverted, so that constants, gaps and exactly known states need no exception.
+//! Memory: the filter is run twice, the second time in stretches of √N rows. Sources: Rauch, Tung & Striebel 1965,
+//! AIAA J. 3; Bierman 1973, Automatica 9 (the adjoint form).
 
 use nalgebra::{DMatrix, DVector};
 
@@ -11,7 +13,8 @@ use super::kalman::Kalman;
 use crate::model::LinearModel;
 use crate::numerics::progress::checkpoint;
 
-/// What a filter was given, row by row: predictions with the input that was held, then the measurements that it accepted.
+/// What a filter was given, row by row: predictions with the input that was held, then the measurements that it
+/// accepted.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct History {
     rows: Vec<Row>,

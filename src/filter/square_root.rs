@@ -1,9 +1,10 @@
-//! Kalman filter on a triangular factor of the covariance, P = S Sᵀ: no difference of large numbers is ever formed, and the digits of P are those of S
-//! twice over. Same convention, same results as [`Kalman`]; it goes on where P in double precision has lost its definiteness.
+//! Kalman filter on a triangular factor of the covariance, P = S Sᵀ: no difference of large numbers is ever formed,
+//! and the digits of P are those of S twice over. Same convention, same results as [`Kalman`]; it goes on where P in
+//! double precision has lost its definiteness.
 //!
-//! Both steps are one orthogonal triangularisation (Householder) of an array whose Gram matrix is the covariance wanted:
-//! prediction [F S, Q^½]ᵀ → S⁺ᵀ, and for a scalar measurement [[√r, 0], [Sᵀhᵀ, Sᵀ]] → [[√s, k̄ᵀ], [0, S⁺ᵀ]] with K = k̄/√s.
-//! Source: Kailath, Sayed & Hassibi 2000, Linear Estimation, section 12.3.
+//! Both steps are one orthogonal triangularisation (Householder) of an array whose Gram matrix is the covariance
+//! wanted: prediction [F S, Q^½]ᵀ → S⁺ᵀ, and for a scalar measurement [[√r, 0], [Sᵀhᵀ, Sᵀ]] → [[√s, k̄ᵀ], [0, S⁺ᵀ]]
+//! with K = k̄/√s. Source: Kailath, Sayed & Hassibi 2000, Linear Estimation, section 12.3.
 
 use nalgebra::{DMatrix, DVector, RealField, convert, convert_unchecked};
 
@@ -163,7 +164,8 @@ fn sum<T: RealField>(terms: impl Iterator<Item = T>) -> T {
     terms.fold(T::zero(), |sum, term| sum + term)
 }
 
-/// The upper triangle R with RᵀR = AᵀA in place of the first rows of A (Householder; Golub & Van Loan 2013, section 5.2); the rest is not cleared.
+/// The upper triangle R with RᵀR = AᵀA in place of the first rows of A (Householder; Golub & Van Loan 2013, section
+/// 5.2); the rest is not cleared.
 fn triangularise<T: RealField + Copy>(a: &mut DMatrix<T>, reflector: &mut [T]) {
     let (rows, columns) = a.shape();
     for j in 0..columns.min(rows) {

@@ -16,7 +16,8 @@ const EIGENVECTOR_RESIDUAL: f64 = 1e-3;
 
 /// The filter after a long time, at a sample at which every measurement is taken.
 ///
-/// With measurements at several rates the covariance repeats after `period` samples; between two such samples it is another.
+/// With measurements at several rates the covariance repeats after `period` samples; between two such samples it is
+/// another.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SteadyState {
     /// Samples after which the pattern of measurements repeats; 1 when all are taken at every sample.
@@ -26,8 +27,8 @@ pub struct SteadyState {
     /// P(k|k−1).
     pub predicted_covariance: DMatrix<f64>,
     pub innovation_covariance: DMatrix<f64>,
-    /// Closed-loop poles per sample, eigenvalues of (I − K H) F, as (re, im). With a longer period, the principal roots of the
-    /// eigenvalues of what an error becomes over one period.
+    /// Closed-loop poles per sample, eigenvalues of (I − K H) F, as (re, im). With a longer period, the principal
+    /// roots of the eigenvalues of what an error becomes over one period.
     pub poles: Vec<(f64, f64)>,
     /// s; four time constants of the slowest closed-loop pole of the driven states (0 when no state is driven).
     pub settling_time: f64,
@@ -58,13 +59,14 @@ pub enum SteadyStateError {
 
 /// Steady state of a model, with measurements at any rates.
 ///
-/// States that nothing drives and nothing damps (a constant bias, a ramp) are split off: their variance tends to zero (like
-/// 1/t for a constant) and their gain is zero. The Riccati equation P = F P Fᵀ − F P Hᵀ S⁻¹ H P Fᵀ + Q of the others, over one period of
-/// the measurements where they have several rates, is solved by doubling and compared with the eigenvector solution. Where a split-off state
-/// cannot be told from a driven one (a constant beside a random walk), the covariance that the filter reaches depends on P0 for ever and is
-/// found from it; gain, S and poles do not.
-/// Errors: rates with no common period, a state that grows without noise, driven states that no measurement sees or tells apart.
-/// Source of the periodic equation: Bittanti, Colaneri, De Nicolao 1991, "The periodic Riccati equation".
+/// States that nothing drives and nothing damps (a constant bias, a ramp) are split off: their variance tends to
+/// zero (like 1/t for a constant) and their gain is zero. The Riccati equation P = F P Fᵀ − F P Hᵀ S⁻¹ H P Fᵀ + Q of
+/// the others, over one period of the measurements where they have several rates, is solved by doubling and compared
+/// with the eigenvector solution. Where a split-off state cannot be told from a driven one (a constant beside a
+/// random walk), the covariance that the filter reaches depends on P0 for ever and is found from it; gain, S and
+/// poles do not. Errors: rates with no common period, a state that grows without noise, driven states that no
+/// measurement sees or tells apart. Source of the periodic equation: Bittanti, Colaneri, De Nicolao 1991, "The
+/// periodic Riccati equation".
 pub fn steady_state(model: &LinearModel) -> Result<SteadyState, SteadyStateError> {
     let cycle = Cycle::new(&model.every).ok_or_else(|| {
         let every: Vec<String> = model.every.iter().map(ToString::to_string).collect();

@@ -1,4 +1,5 @@
-//! Products with F that skip its zeros: a line of vibration has a block of its own, so that F of many states is nearly empty.
+//! Products with F that skip its zeros: a line of vibration has a block of its own, so that F of many states is
+//! nearly empty.
 
 use nalgebra::DMatrix;
 

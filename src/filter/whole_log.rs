@@ -1,12 +1,14 @@
-//! A whole log through a time-invariant filter: innovations, NIS and likelihood, each the same as those of [`Kalman`] to rounding.
+//! A whole log through a time-invariant filter: innovations, NIS and likelihood, each the same as those of
+//! [`Kalman`] to rounding.
 //!
-//! Gains and covariances of such a filter do not depend on the data. All of the state but a constant bias settles; the bias, whose variance
-//! falls like 1/t for ever, is split off (Friedland 1969): a filter without it gives ν̃ and S̃, and s, how ν̃ answers to the bias, settles too.
-//! With I the information on the bias, b̂ its estimate:
+//! Gains and covariances of such a filter do not depend on the data. All of the state but a constant bias settles;
+//! the bias, whose variance falls like 1/t for ever, is split off (Friedland 1969): a filter without it gives ν̃ and
+//! S̃, and s, how ν̃ answers to the bias, settles too. With I the information on the bias, b̂ its estimate:
 //!
 //! ν = ν̃ − s b̂, S = S̃ (I + s²/S̃)/I, I ← I + s²/S̃, b̂ ← b̂ + (s/S̃)/I ν.
 //!
-//! Once S̃, its gain K and s stand still, a step is x ← F (I − K h) x + F K z, and Σ ln S telescopes to n ln S̃ + ln (I_end/I_start).
+//! Once S̃, its gain K and s stand still, a step is x ← F (I − K h) x + F K z, and Σ ln S telescopes to n ln S̃ + ln
+//! (I_end/I_start).
 
 use nalgebra::{DMatrix, DVector};
 use pulp::{Arch, NullaryFnOnce};
@@ -21,13 +23,14 @@ use super::kalman::{predict_fixed, square, update_fixed};
 use crate::model::LinearModel;
 use crate::numerics::progress::checkpoint;
 
-/// Innovations of a log of the first measurement of `model`, one at every step; inputs are zero, other measurements are not taken.
+/// Innovations of a log of the first measurement of `model`, one at every step; inputs are zero, other measurements
+/// are not taken.
 ///
-/// Writes ν = z − H x(k|k−1) and ν²/S of every sample (NaN where it is not a number below 1e140; the filter predicts over it) and hands back
-/// ln L = Σ −½ (ln 2πS + ν²/S). SI units. Panics when the three lists differ in length.
+/// Writes ν = z − H x(k|k−1) and ν²/S of every sample (NaN where it is not a number below 1e140; the filter predicts
+/// over it) and hands back ln L = Σ −½ (ln 2πS + ν²/S). SI units. Panics when the three lists differ in length.
 ///
-/// A model with at most six states beside the bias runs at the speed of its settled gains; others, and those that take their measurement
-/// more seldom, carry their covariance from step to step.
+/// A model with at most six states beside the bias runs at the speed of its settled gains; others, and those that
+/// take their measurement more seldom, carry their covariance from step to step.
 pub fn innovations(model: &LinearModel, z: &[f64], innovation: &mut [f64], nis: &mut [f64]) -> f64 {
     assert!(z.len() == innovation.len() && z.len() == nis.len(), "as many results as samples");
     let squares = |innovation: &[f64], weight: &mut [f64]| {
@@ -163,7 +166,8 @@ pub struct TwoStage {
 }
 
 impl TwoStage {
-    /// `None` for a model that it cannot run: more than six states beside the bias, or a measurement that is not taken at every step or has no noise.
+    /// `None` for a model that it cannot run: more than six states beside the bias, or a measurement that is not
+    /// taken at every step or has no noise.
     pub fn new(model: &LinearModel) -> Option<TwoStage> {
         let n = model.x0.len();
         if model.every.first() != Some(&1) || model.r[(0, 0)].is_nan() || model.r[(0, 0)] <= 0.0 {
@@ -205,7 +209,8 @@ impl TwoStage {
         })
     }
 
-    /// The next samples: ν and 1/S of each, NaN where it is not a number below 1e140. Afterwards the state is that after the last.
+    /// The next samples: ν and 1/S of each, NaN where it is not a number below 1e140. Afterwards the state is that
+    /// after the last.
     pub fn run(&mut self, z: &[f64], innovation: &mut [f64], weight: &mut [f64]) {
         let mut at = 0;
         while at < z.len() {
@@ -329,7 +334,8 @@ impl TwoStage {
         came.samples
     }
 
-    /// Samples with everything but the bias settled; x is predicted for the first, and afterwards for the one that follows the last.
+    /// Samples with everything but the bias settled; x is predicted for the first, and afterwards for the one that
+    /// follows the last.
     fn settled<const N: usize>(&mut self, z: &[f64], innovation: &mut [f64], weight: &mut [f64]) {
         let direction = &self.rest.p * &self.h;
         let variance = self.h.dot(&direction) + self.r;

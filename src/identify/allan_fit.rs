@@ -1,9 +1,10 @@
-//! The weighted fit of the whole Allan curve, or of the Haar wavelet variances: terms chosen, intervals given, what the log cannot tell said.
+//! The weighted fit of the whole Allan curve, or of the Haar wavelet variances: terms chosen, intervals given, what
+//! the log cannot tell said.
 //!
 //! Rules. A parameter is identified when the upper end of its 95 % interval is at most ten times the lower end; its
-//! interval is exp(ln θ ± 1.96 s), s from the fit, widened by √(χ²/dof) when the model does not explain the curve. The model is the
-//! one of the lowest score (see `selection`) whose parameters are all identified. Interval widths shrink as
-//! T^(−1/2) with the length T of the log (Cramér-Rao): from that the log length that would tell.
+//! interval is exp(ln θ ± 1.96 s), s from the fit, widened by √(χ²/dof) when the model does not explain the curve.
+//! The model is the one of the lowest score (see `selection`) whose parameters are all identified. Interval widths
+//! shrink as T^(−1/2) with the length T of the log (Cramér-Rao): from that the log length that would tell.
 
 use super::points::{Distance, Points};
 use super::selection::{FIT_LEVEL, PENALTY, Table, score, search};
@@ -107,8 +108,8 @@ pub(super) fn identify(
     })
 }
 
-/// The model that [`Method::Allan`](super::Method::Allan) would choose for a curve of overlapping Allan deviations, five a decade or so, of one log or of windows;
-/// the sign of a ramp is not in it.
+/// The model that [`Method::Allan`](super::Method::Allan) would choose for a curve of overlapping Allan deviations,
+/// five a decade or so, of one log or of windows; the sign of a ramp is not in it.
 pub fn model_of_curve(name: &str, curve: &AllanCurve) -> Result<NoiseModel, IdentifyError> {
     let table = search(&Points::of_curve(curve, Distance::CubeRoots), None);
     let fit = table.ranked().into_iter().find(|fit| unknown(fit).is_empty()).ok_or_else(|| IdentifyError {
@@ -149,8 +150,8 @@ fn unknown(fit: &Fit) -> Vec<usize> {
     (0..fit.log_parameters.len()).filter(|j| interval(fit, *j).is_none()).collect()
 }
 
-/// The terms whose parameters are all identified, with their intervals; Gauss-Markov by ascending correlation time, the sign
-/// of a ramp from the log.
+/// The terms whose parameters are all identified, with their intervals; Gauss-Markov by ascending correlation time,
+/// the sign of a ramp from the log.
 fn known_terms(fit: &Fit, rate: &[f64]) -> Vec<(Term, [Option<[f64; 2]>; 2])> {
     let mut index = 0;
     let mut known = Vec::new();

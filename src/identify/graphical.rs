@@ -1,7 +1,8 @@
 //! The seed paper's recipe, step by step, with what each step costs.
 //!
-//! Read N off the −1/2 line, σ_g = N/√dt, smooth the log with a 100-sample moving average and take its standard deviation for
-//! σ_GM, Tc = τ_max/1.89 from the maximum of the Allan curve after its minimum, B = minimum/0.664. No step has an interval.
+//! Read N off the −1/2 line, σ_g = N/√dt, smooth the log with a 100-sample moving average and take its standard
+//! deviation for σ_GM, Tc = τ_max/1.89 from the maximum of the Allan curve after its minimum, B = minimum/0.664. No
+//! step has an interval.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -32,8 +33,8 @@ pub const WINDOW: usize = 100;
 pub const PEAK_POSITION: f64 = 1.89;
 /// Floor of flicker noise as the recipe has it; √(2 ln 2/π) = 0.664282 to six digits.
 pub const FLICKER_FLOOR: f64 = 0.664;
-/// Averages in the log at the longest averaging time that is read: fewer leave an error of more than 25 % (1/√(2(n/m − 1)), IEEE
-/// Std 952), and the end of the curve then passes for a maximum.
+/// Averages in the log at the longest averaging time that is read: fewer leave an error of more than 25 % (1/√(2(n/m
+/// − 1)), IEEE Std 952), and the end of the curve then passes for a maximum.
 const FEWEST_AVERAGES: usize = 9;
 /// No maximum exists in white noise + Gauss-Markov when N/(σ√Tc) is larger.
 const LARGEST_RATIO: f64 = 0.35610;
@@ -152,8 +153,8 @@ fn lowest(points: &[&AllanPoint]) -> Option<usize> {
     (0..points.len()).min_by(|i, j| points[*i].deviation.total_cmp(&points[*j].deviation))
 }
 
-/// The maximum after the minimum: the point that rises most above the lowest one before it, unless it is the last of all or
-/// rises by less than its own standard deviation, 1/√(2 edf) of the deviation.
+/// The maximum after the minimum: the point that rises most above the lowest one before it, unless it is the last of
+/// all or rises by less than its own standard deviation, 1/√(2 edf) of the deviation.
 fn peak(points: &[&AllanPoint]) -> Option<usize> {
     let mut below = f64::INFINITY;
     let mut found: Option<(f64, usize)> = None;

@@ -139,7 +139,8 @@ fn of_axis(axis: &AxisParams, parameter: &str, precision: f64, rate_hz: f64) -> 
     })
 }
 
-/// Ten times the rate (if no term counts samples), the rate itself, a tenth, … until averages ask for a log twice as long.
+/// Ten times the rate (if no term counts samples), the rate itself, a tenth, … until averages ask for a log twice as
+/// long.
 fn rates(own: &Sampling, row: &impl Fn(&Sampling, bool) -> RatePlan, faster: bool) -> Vec<RatePlan> {
     let ten_times = Sampling { sensor_rate_hz: 10.0 * own.sensor_rate_hz, ..*own };
     let of_the_sensor = if faster { vec![ten_times, *own] } else { vec![*own] };

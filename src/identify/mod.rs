@@ -1,4 +1,5 @@
-//! Logs to noise parameters (floor 4): maximum likelihood, the weighted Allan fit, wavelet moments, the paper's graphical recipe.
+//! Logs to noise parameters (floor 4): maximum likelihood, the weighted Allan fit, wavelet moments, the paper's
+//! graphical recipe.
 //!
 //! One file or folder per method, one variant of [`Method`] each; what they share is here.
 
@@ -44,7 +45,8 @@ pub enum Method {
     Allan,
     /// Maximum likelihood on the cosine coefficients of the log, terms chosen by score; see `likelihood`.
     Likelihood,
-    /// Generalised method of wavelet moments (Guerrier et al. 2013) on Haar wavelet variances: [`allan_fit`] with other weights.
+    /// Generalised method of wavelet moments (Guerrier et al. 2013) on Haar wavelet variances: [`allan_fit`] with
+    /// other weights.
     Gmwm,
 }
 
@@ -101,7 +103,8 @@ pub struct Candidate {
     /// ln L of the last third of the log under the parameters that the first two thirds give.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held_out: Option<f64>,
-    /// Lowest wins. Allan fit and wavelet moments: χ² plus 4 for every parameter and every process; likelihood: −2 ln L plus a cost for every process.
+    /// Lowest wins. Allan fit and wavelet moments: χ² plus 4 for every parameter and every process; likelihood: −2
+    /// ln L plus a cost for every process.
     pub score: f64,
     /// Every parameter has a 95 % interval that says something.
     pub identified: bool,
@@ -113,7 +116,8 @@ pub struct Candidate {
 pub struct Precision {
     /// `gauss_markov.std_dev`.
     pub parameter: String,
-    /// Standard deviation from the curvature of the likelihood; null where it says nothing, and of a parameter that is held.
+    /// Standard deviation from the curvature of the likelihood; null where it says nothing, and of a parameter that
+    /// is held.
     #[schemars(with = "Option<f64>")]
     pub std_dev_percent: f64,
     /// Cramér-Rao bound: no unbiased estimate from a log like this has a smaller standard deviation.
@@ -154,7 +158,8 @@ pub struct Identified {
     pub steps: Vec<graphical::Step>,
     /// p-value of the chosen model's fit (NaN for graphical).
     pub fit_p_value: f64,
-    /// Likelihood only: distance of the cumulative periodogram of the log over the model's spectrum from a straight line.
+    /// Likelihood only: distance of the cumulative periodogram of the log over the model's spectrum from a straight
+    /// line.
     pub fit_distance: Option<f64>,
     /// Shortest averaging time that an Allan fit used, s.
     pub first_tau_s: Option<f64>,
@@ -178,8 +183,10 @@ pub struct IdentifiedAxis {
 const SURELY_MISSED: f64 = 1e-6;
 
 impl Identified {
-    /// The fit misses the log surely (p below 10⁻⁶) and by more than is tolerated of a measured log in `compare` and `replay`: a tenth of the cumulative periodogram, of
-    /// the methods on curves a factor of 1.3 of the Allan variance where its own interval does not hold the model's. The second keeps logs that are so long that every model is seen to be one.
+    /// The fit misses the log surely (p below 10⁻⁶) and by more than is tolerated of a measured log in `compare` and
+    /// `replay`: a tenth of the cumulative periodogram, of the methods on curves a factor of 1.3 of the Allan
+    /// variance where its own interval does not hold the model's. The second keeps logs that are so long that every
+    /// model is seen to be one.
     pub fn missed(&self) -> Option<Check> {
         let (name, effect, tolerated, words) = match self.fit_distance {
             Some(distance) => {
@@ -208,7 +215,8 @@ impl Identified {
         })
     }
 
-    /// Largest ratio, either way, of the log's Allan variance and the model's, of averaging times that were used and whose interval does not hold the model's.
+    /// Largest ratio, either way, of the log's Allan variance and the model's, of averaging times that were used and
+    /// whose interval does not hold the model's.
     fn farthest(&self) -> f64 {
         let from = self.first_tau_s.unwrap_or(0.0);
         let ratio = |point: &AllanPoint| {
@@ -229,7 +237,8 @@ pub struct IdentifyError {
 
 /// Largest upper/lower ratio of a 95 % interval that still says something.
 const WIDEST_INTERVAL: f64 = 10.0;
-/// A random walk and a Gauss-Markov process differ in nearly all logs of this many correlation times, in three quarters and more of those half as long (docs/validation.md).
+/// A random walk and a Gauss-Markov process differ in nearly all logs of this many correlation times, in three
+/// quarters and more of those half as long (docs/validation.md).
 const LENGTHS_TO_TELL: f64 = 40.0;
 
 /// A log so many times as long is nothing to recommend.
@@ -243,7 +252,8 @@ fn worth_recording(needed_s: f64, span_s: f64) -> Option<f64> {
 /// Fewest samples from which anything is identified: three averages of ten samples.
 pub const FEWEST_SAMPLES: usize = 30;
 
-/// Identify one axis. `rate` SI, contiguous, finite; `dt` in s; `display` the unit of the log, in whose family results are written.
+/// Identify one axis. `rate` SI, contiguous, finite; `dt` in s; `display` the unit of the log, in whose family
+/// results are written.
 ///
 /// Fails on fewer than 30 samples, on samples that are not finite and on a constant axis.
 pub fn identify_axis(
@@ -268,8 +278,9 @@ pub fn identify_axis(
 
 /// The same by maximum likelihood from logs with gaps, or from several logs of one sensor, each with its own bias.
 ///
-/// `stretches`: of each log samples without gaps; on those of them that have the most samples when they are cut to one length the terms are chosen.
-/// `logs` are all samples, stretch by stretch. `holds`: parameters that keep a value.
+/// `stretches`: of each log samples without gaps; on those of them that have the most samples when they are cut to
+/// one length the terms are chosen. `logs` are all samples, stretch by stretch. `holds`: parameters that keep a
+/// value.
 pub fn identify_logs(
     name: &str,
     stretches: &[&[f64]],
@@ -367,7 +378,8 @@ fn would_have_shown(limit: Option<&Measured>) -> String {
     limit.map_or_else(String::new, of)
 }
 
-/// A term as documented, with the 95 % intervals (SI) of its parameters as far as they are known, in the order of [`Term`].
+/// A term as documented, with the 95 % intervals (SI) of its parameters as far as they are known, in the order of
+/// [`Term`].
 fn entry(term: &Term, intervals: &[Option<[f64; 2]>], display: &Unit) -> Result<TermEntry, IdentifyError> {
     let unit = coefficient_unit(term.kind(), display);
     let interval = |index: usize| intervals.get(index).copied().flatten();

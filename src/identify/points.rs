@@ -1,8 +1,9 @@
 //! The measured Allan points and the covariance between them for any mixture.
 //!
-//! The covariance is a quadratic form in the squared coefficients. Its parts, one per pair of unit processes, depend on the averaging times and the
-//! length of the log only and are worked out once, for all axes of a log together: a fit then changes coefficients at no cost. A Gauss-Markov
-//! process between two tabulated correlation times counts as their mixture, for the weights only (the Allan variances are always exact).
+//! The covariance is a quadratic form in the squared coefficients. Its parts, one per pair of unit processes, depend
+//! on the averaging times and the length of the log only and are worked out once, for all axes of a log together: a
+//! fit then changes coefficients at no cost. A Gauss-Markov process between two tabulated correlation times counts
+//! as their mixture, for the weights only (the Allan variances are always exact).
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
@@ -16,7 +17,8 @@ use crate::noise::{Kind, NoiseModel, Term};
 
 /// Correlation times shorter than this many samples are a matter of the sensor's bandwidth, not of drift.
 const SHORTEST_CORRELATION: f64 = 10.0;
-/// Correlation times are searched up to this many lengths of the log; further out a Gauss-Markov process is a random walk.
+/// Correlation times are searched up to this many lengths of the log; further out a Gauss-Markov process is a random
+/// walk.
 const LONGEST_CORRELATION: f64 = 3.0;
 /// … and, where short averaging times are left out of a short log, up to this many times the shortest at least.
 const LEAST_RANGE: f64 = 128.0;
@@ -28,7 +30,8 @@ const NODE_RATIO: f64 = 2.0;
 pub(super) enum Distance {
     /// Their cube roots, nearly normal, with their whole covariance.
     CubeRoots,
-    /// The variances themselves, each weighted by the inverse of its own variance: the generalised method of wavelet moments.
+    /// The variances themselves, each weighted by the inverse of its own variance: the generalised method of wavelet
+    /// moments.
     Variances,
 }
 
@@ -60,10 +63,12 @@ struct Geometry {
     form: Form,
 }
 
-/// Geometries in use: axes of one log that are worked on at the same time share theirs. What is found does not depend on it.
+/// Geometries in use: axes of one log that are worked on at the same time share theirs. What is found does not
+/// depend on it.
 static IN_USE: Mutex<Vec<Weak<Geometry>>> = Mutex::new(Vec::new());
 
-/// Kinds without a time that an Allan curve shows, in the order of the processes; Gauss-Markov processes of tabulated times follow.
+/// Kinds without a time that an Allan curve shows, in the order of the processes; Gauss-Markov processes of
+/// tabulated times follow.
 const PLAIN: [Kind; 4] = [Kind::Quantization, Kind::White, Kind::BiasInstability, Kind::RateRandomWalk];
 
 /// What the weights need.
@@ -249,7 +254,8 @@ mod tests {
         }
     }
 
-    /// More axes than threads, all of one geometry, each asking from within the work of another: none waits for ever, all find what one alone does.
+    /// More axes than threads, all of one geometry, each asking from within the work of another: none waits for
+    /// ever, all find what one alone does.
     #[test]
     fn axes_share_the_work() {
         let rate: Vec<f64> = (0..2000).map(|k| f64::from(k * 7919 % 1000) / 1000.0).collect();

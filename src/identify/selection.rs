@@ -11,12 +11,14 @@ use crate::noise::Kind;
 
 /// The score of a model is its χ² plus this for every parameter and again for every process; the lowest score wins.
 ///
-/// A random walk or flicker term on a white log must gain 8 (probability 0.0023 by chance), a Gauss-Markov term 12; but to
-/// prefer Gauss-Markov to the random walk, its limit, it must gain 4 (0.023). Measured rates: docs/validation.md.
+/// A random walk or flicker term on a white log must gain 8 (probability 0.0023 by chance), a Gauss-Markov term 12;
+/// but to prefer Gauss-Markov to the random walk, its limit, it must gain 4 (0.023). Measured rates:
+/// docs/validation.md.
 pub(super) const PENALTY: f64 = 4.0;
 /// A fit with a smaller p-value does not explain the curve.
 pub(super) const FIT_LEVEL: f64 = 0.001;
-/// And with one smaller than this, short averaging times are left out: with [`FIT_LEVEL`], one log in a thousand would lose most of what it knows of the white noise.
+/// And with one smaller than this, short averaging times are left out: with [`FIT_LEVEL`], one log in a thousand
+/// would lose most of what it knows of the white noise.
 const LEAVING_OUT_LEVEL: f64 = 1e-4;
 /// Most Gauss-Markov processes that are looked for.
 const MOST_GAUSS_MARKOV: usize = 2;
@@ -24,9 +26,10 @@ const MOST_GAUSS_MARKOV: usize = 2;
 const LEFT_OUT_FACTOR: u64 = 100;
 /// … as long as this range of times remains: ten points of five a decade, seven octaves.
 const REMAINING_RANGE: u64 = 62;
-/// Times below this many times the first at which the departure is no longer seen are left out too. Of autocovariances γ_k that end, the Allan variance of m
-/// samples, (S − 3/(2m) Σ|k|γ_k)/m with S = Σγ_k, keeps a part that fades as 1/m; where it is just not seen it is some standard deviations of N, at eight times
-/// m, where N is known √8 times worse, 1/23 of that.
+/// Times below this many times the first at which the departure is no longer seen are left out too. Of
+/// autocovariances γ_k that end, the Allan variance of m samples, (S − 3/(2m) Σ|k|γ_k)/m with S = Σγ_k, keeps a part
+/// that fades as 1/m; where it is just not seen it is some standard deviations of N, at eight times m, where N is
+/// known √8 times worse, 1/23 of that.
 const MARGIN: u64 = 8;
 
 /// All models that were fitted to the same points.
@@ -103,12 +106,14 @@ fn neighbours(shape: &Shape) -> Vec<Shape> {
     found
 }
 
-/// Fit the forced model, or grow one, to the points; if that does not explain the curve (p below 10⁻⁴), try without the shortest averaging times.
+/// Fit the forced model, or grow one, to the points; if that does not explain the curve (p below 10⁻⁴), try without
+/// the shortest averaging times.
 ///
-/// The rule: only averaging factors up to 100 samples may be left out for that (anti-alias filters and vibration act there), and
-/// [`REMAINING_RANGE`] must remain. A model is found on the points beyond; the shorter ones are then taken in, longest first, as long
-/// as the fit keeps a p-value of 0.001. What counts is the model of those beyond [`MARGIN`] times the shortest of them, if enough remain and it
-/// explains them. If no model explains even the long averaging times, nothing is left out, unless the misfit √(χ²/dof) more than halves by it.
+/// The rule: only averaging factors up to 100 samples may be left out for that (anti-alias filters and vibration act
+/// there), and [`REMAINING_RANGE`] must remain. A model is found on the points beyond; the shorter ones are then
+/// taken in, longest first, as long as the fit keeps a p-value of 0.001. What counts is the model of those beyond
+/// [`MARGIN`] times the shortest of them, if enough remain and it explains them. If no model explains even the long
+/// averaging times, nothing is left out, unless the misfit √(χ²/dof) more than halves by it.
 pub(super) fn search(points: &Points, forced: Option<&Shape>) -> Table {
     let find = |points: &Points| match forced {
         None => grow(points),

@@ -79,7 +79,8 @@ pub(super) fn one_coefficient(kind: Kind, value: f64) -> Term {
     }
 }
 
-/// The kinds that show in an Allan curve: it averages a narrow line away, and averages and band limits are white but for the shortest times.
+/// The kinds that show in an Allan curve: it averages a narrow line away, and averages and band limits are white but
+/// for the shortest times.
 pub(super) fn in_allan_curve(kind: Kind) -> bool {
     !matches!(kind, Kind::MovingAverage | Kind::BandLimit | Kind::Oscillation)
 }

@@ -1,18 +1,22 @@
-//! Tails of the noise: how much more than of normal noise its level scatters, and a level that does not leave the tails out.
+//! Tails of the noise: how much more than of normal noise its level scatters, and a level that does not leave the
+//! tails out.
 //!
-//! N is the root of a density: variance per sample × sample period, because a filter that adds up many samples sees their variance, whatever their law.
-//! The log is whitened by the spectrum of its model, z = C⁻¹ (c_j √(dt/S_j)), c = C x cosine coefficients of segments. Of a linear process whose
-//! innovations have the excess kurtosis κ the power of z has the variance (2 + κ)/n, and the inverse information of Whittle's likelihood
-//! lacks u uᵀ κ/4n, u = 1 for the logarithm of every coefficient (in the unit of the log) and 0 for every time and frequency: I u = ½ Σ_j ∂ ln S_j, so that this is its
-//! sandwich exactly. So one rule serves every method: var ln θ grows by κ/4n for every coefficient θ. 2 + κ is the variance of the sum of z² over blocks by their length: blocks as
-//! long as a filter of the sensor remembers, because z is that process but for its phases.
-//! Squares of Student-t noise of 4 degrees of freedom have no variance, yet their mean over its own standard error becomes normal.
+//! N is the root of a density: variance per sample × sample period, because a filter that adds up many samples sees
+//! their variance, whatever their law. The log is whitened by the spectrum of its model, z = C⁻¹ (c_j √(dt/S_j)), c =
+//! C x cosine coefficients of segments. Of a linear process whose innovations have the excess kurtosis κ the power
+//! of z has the variance (2 + κ)/n, and the inverse information of Whittle's likelihood lacks u uᵀ κ/4n, u = 1 for
+//! the logarithm of every coefficient (in the unit of the log) and 0 for every time and frequency: I u = ½ Σ_j ∂ ln
+//! S_j, so that this is its sandwich exactly. So one rule serves every method: var ln θ grows by κ/4n for every
+//! coefficient θ. 2 + κ is the variance of the sum of z² over blocks by their length: blocks as long as a filter of
+//! the sensor remembers, because z is that process but for its phases. Squares of Student-t noise of 4 degrees of
+//! freedom have no variance, yet their mean over its own standard error becomes normal.
 //!
-//! Where samples are left out as outliers, the rest is cut where outliers begin, and the law of what was cut is found from it: Student's t with scale s
-//! and ν degrees of freedom, of which normal noise is the limit, at the maximum of the likelihood of the samples within the cut, given that they are there.
-//! Noise of that law has the variance s² ν/(ν − 2), its tails included.
-//! Sources: Whittle 1953; Hannan 1973 and Hosoya & Taniguchi 1982 (κ in the covariance of Whittle's estimates); Giné, Götze & Mason 1997
-//! (self-normalised sums); Lange, Little & Taylor 1989 (t likelihood); Cohen 1991, chapter 2 (truncated samples).
+//! Where samples are left out as outliers, the rest is cut where outliers begin, and the law of what was cut is
+//! found from it: Student's t with scale s and ν degrees of freedom, of which normal noise is the limit, at the
+//! maximum of the likelihood of the samples within the cut, given that they are there. Noise of that law has the
+//! variance s² ν/(ν − 2), its tails included. Sources: Whittle 1953; Hannan 1973 and Hosoya & Taniguchi 1982 (κ in
+//! the covariance of Whittle's estimates); Giné, Götze & Mason 1997 (self-normalised sums); Lange, Little & Taylor
+//! 1989 (t likelihood); Cohen 1991, chapter 2 (truncated samples).
 
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -35,7 +39,8 @@ pub(super) const MOST_SEGMENTS: usize = 16;
 const BLOCKS: [usize; 3] = [1, 8, 64];
 /// Fewest blocks whose variance says something.
 const FEWEST_BLOCKS: f64 = 32.0;
-/// An excess this many standard deviations above that of normal noise counts: one log of a hundred has it by chance, and hardly wider intervals for it.
+/// An excess this many standard deviations above that of normal noise counts: one log of a hundred has it by chance,
+/// and hardly wider intervals for it.
 const BEYOND_CHANCE: f64 = 2.33;
 /// Twice the gain in ln L by which Student's t is told from normal noise: of chance once in two hundred logs.
 const STUDENT: f64 = 6.6;
@@ -85,7 +90,8 @@ impl Identified {
         self
     }
 
-    /// N of logs from which outliers were left out, its tails put back where they are of the noise. `left_out`: of each stretch the samples of `rates` that are not of the log.
+    /// N of logs from which outliers were left out, its tails put back where they are of the noise. `left_out`: of
+    /// each stretch the samples of `rates` that are not of the log.
     pub fn put_tails_back(&mut self, rates: &[&[f64]], left_out: &[&[usize]], dt: f64) {
         let Some(white) = Whitener::new(rates, dt, &self.model) else { return };
         let segments = white.segments(rates);
@@ -114,7 +120,8 @@ impl Identified {
         }
     }
 
-    /// Multiplies what is white by `factor` and adds `variance` to that of the logarithm of every coefficient; `open`: there is no upper limit of what is white.
+    /// Multiplies what is white by `factor` and adds `variance` to that of the logarithm of every coefficient;
+    /// `open`: there is no upper limit of what is white.
     fn scale(&mut self, factor: f64, variance: f64, open: bool) {
         if variance == 0.0 && factor == 1.0 && !open {
             return;
@@ -254,7 +261,8 @@ impl Blocks {
         }))
     }
 
-    /// Variance of the power per sample over its square, less the 2 of normal noise, of that length of blocks which shows most; 0 within chance.
+    /// Variance of the power per sample over its square, less the 2 of normal noise, of that length of blocks which
+    /// shows most; 0 within chance.
     ///
     /// Each stretch, whose number stands first, about its own mean.
     fn excess(all: &[(usize, Blocks)]) -> f64 {

@@ -1,22 +1,26 @@
 //! Generalised least squares on the overlapping Allan curve.
 //!
-//! The points are correlated and, at long averaging times, far from normal. Both are taken into account: with
-//! v_i the measured and a_i(θ) the sampled-form Allan variance and e_i the exact degrees of freedom, the cube root
-//! (v_i/a_i)^(1/3) is nearly normal (Wilson and Hilferty 1931) with the moments of (χ²_e/e)^(1/3), and the points are
-//! correlated as the exact covariance of the estimates says. The fit minimises the whitened residuals of the cube roots,
-//! recomputes the weights at the minimum and repeats until nothing moves.
+//! The points are correlated and, at long averaging times, far from normal. Both are taken into account: with v_i
+//! the measured and a_i(θ) the sampled-form Allan variance and e_i the exact degrees of freedom, the cube root
+//! (v_i/a_i)^(1/3) is nearly normal (Wilson and Hilferty 1931) with the moments of (χ²_e/e)^(1/3), and the points
+//! are correlated as the exact covariance of the estimates says. The fit minimises the whitened residuals of the
+//! cube roots, recomputes the weights at the minimum and repeats until nothing moves.
 //!
-//! To half the sum of squares comes ⅓ Σ h_i ln a_i, h_i the leverage of point i (diagonal of D(DᵀC⁻¹D)⁻¹DᵀC⁻¹, D the Jacobian of the cube roots, C
-//! their covariance; Σ h_i is the number of parameters): for one variance with e degrees of freedom that moves the estimate from v(1 + 2/(3e)), where the mean of
-//! the cube root is met, to v, which is its maximum likelihood. Since a long correlation time has few degrees of freedom, the long upper tails of σ and Tc shrink: on logs of
-//! 37 correlation times their variance is 6 % smaller, and the mean of an estimate lies a tenth of its standard deviation low (docs/validation.md).
+//! To half the sum of squares comes ⅓ Σ h_i ln a_i, h_i the leverage of point i (diagonal of D(DᵀC⁻¹D)⁻¹DᵀC⁻¹, D the
+//! Jacobian of the cube roots, C their covariance; Σ h_i is the number of parameters): for one variance with e
+//! degrees of freedom that moves the estimate from v(1 + 2/(3e)), where the mean of the cube root is met, to v,
+//! which is its maximum likelihood. Since a long correlation time has few degrees of freedom, the long upper tails
+//! of σ and Tc shrink: on logs of 37 correlation times their variance is 6 % smaller, and the mean of an estimate
+//! lies a tenth of its standard deviation low (docs/validation.md).
 //!
-//! The generalised method of wavelet moments is the same machinery with another distance, Σ_i ((v_i − a_i)/s_i)² at averaging times of 2^i samples
-//! (Haar wavelet variances are half the Allan variances, see `allan::wavelet`): s_i² = 2 a_i²/e_i is the exact variance of each estimate under the
-//! fitted model, in place of the bootstrap of the source; correlation is left out of the weights. It is taken into account afterwards: with D the
-//! Jacobian of the variances, Ω the weights and V the exact covariance, the estimates have the covariance A V Aᵀ, A = (DᵀΩD)⁻¹DᵀΩ. The goodness
-//! of fit, and the score by which terms are chosen, is that of the whitened cube roots less what the parameters could still explain.
-//! Source: Guerrier, Skaloud, Stebler & Victoria-Feser 2013 (JASA 108), equations 7 and 9.
+//! The generalised method of wavelet moments is the same machinery with another distance, Σ_i ((v_i − a_i)/s_i)² at
+//! averaging times of 2^i samples (Haar wavelet variances are half the Allan variances, see `allan::wavelet`): s_i² =
+//! 2 a_i²/e_i is the exact variance of each estimate under the fitted model, in place of the bootstrap of the
+//! source; correlation is left out of the weights. It is taken into account afterwards: with D the Jacobian of the
+//! variances, Ω the weights and V the exact covariance, the estimates have the covariance A V Aᵀ, A = (DᵀΩD)⁻¹DᵀΩ.
+//! The goodness of fit, and the score by which terms are chosen, is that of the whitened cube roots less what the
+//! parameters could still explain. Source: Guerrier, Skaloud, Stebler & Victoria-Feser 2013 (JASA 108), equations 7
+//! and 9.
 
 use nalgebra::{DMatrix, DVector};
 use statrs::function::gamma::ln_gamma;
@@ -38,7 +42,8 @@ pub(super) struct Fit {
     /// Whitened sum of squares; of the wavelet moments what is left of it beyond all parameters.
     pub(super) chi_square: f64,
     pub(super) points: usize,
-    /// −2 ln of the density of the variances under this fit, but for a constant: by it maxima with weights of their own compare.
+    /// −2 ln of the density of the variances under this fit, but for a constant: by it maxima with weights of their
+    /// own compare.
     surprise: f64,
 }
 
@@ -159,7 +164,8 @@ impl Weights {
         }
     }
 
-    /// Diagonal of D(DᵀC⁻¹D)⁻¹DᵀC⁻¹ = L P L⁻¹, C = L Lᵀ, P the projection on the whitened derivatives by what is not at a bound.
+    /// Diagonal of D(DᵀC⁻¹D)⁻¹DᵀC⁻¹ = L P L⁻¹, C = L Lᵀ, P the projection on the whitened derivatives by what is not
+    /// at a bound.
     fn leverages(
         &self,
         points: &Points,
@@ -320,7 +326,8 @@ fn starts(points: &Points, shape: &Shape) -> Vec<Vec<f64>> {
     combinations.iter().map(start).collect()
 }
 
-/// Minimise half the whitened sum of squares, and what leans on it, from a start, within bounds; returns parameters and the minimum.
+/// Minimise half the whitened sum of squares, and what leans on it, from a start, within bounds; returns parameters
+/// and the minimum.
 fn descend(
     points: &Points,
     shape: &Shape,
@@ -411,7 +418,8 @@ fn finish(
     let (residuals, jacobian) = split(weights);
     let sum_of_squares = residuals.norm_squared();
     let inverse = nalgebra::Cholesky::new(jacobian.transpose() * &jacobian).map(|c| c.inverse());
-    // wide weights make every residual small: the normal density of the cube roots, as one of the variances, has their price in it
+    // wide weights make every residual small: the normal density of the cube roots, as one of the variances, has
+    // their price in it
     let volume: f64 = (0..points.len()).map(|i| weights.factor[(i, i)].ln() + weights.reference[i].ln() / 3.0).sum();
     let (covariance, chi_square) = match points.distance() {
         Distance::CubeRoots => (inverse, sum_of_squares),
@@ -443,8 +451,8 @@ fn finish(
     Some(Fit { shape: shape.clone(), log_parameters, log_sigmas, chi_square, points: points.len(), surprise })
 }
 
-/// The smallest sum of squares when a term of this coefficient is added to the model and all other parameters stay but the
-/// white density, which is fitted again: how well the log tolerates the term.
+/// The smallest sum of squares when a term of this coefficient is added to the model and all other parameters stay
+/// but the white density, which is fitted again: how well the log tolerates the term.
 pub(super) fn tolerated(points: &Points, fit: &Fit, kind: Kind, log_coefficient: f64) -> Option<f64> {
     let shape = fit.shape.with(kind);
     let mut fitted = fit.log_parameters.iter().copied();
@@ -468,8 +476,9 @@ mod tests {
     use crate::allan::{self, Deviation, TauGrid};
     use crate::numerics::random::{StreamId, stream};
 
-    /// A white density two standard deviations off the best fit raises the whitened sum of squares by 4, and what no parameter could explain by
-    /// nothing, to second order: 1.6 % more density changes expected squares by 3 %, and the misfit of 13 points by about that share of itself.
+    /// A white density two standard deviations off the best fit raises the whitened sum of squares by 4, and what no
+    /// parameter could explain by nothing, to second order: 1.6 % more density changes expected squares by 3 %, and
+    /// the misfit of 13 points by about that share of itself.
     #[test]
     fn misfit_is_what_no_parameter_could_explain() {
         let shape = Shape::new(vec![Kind::White, Kind::GaussMarkov]);
@@ -496,7 +505,8 @@ mod tests {
         assert!((found.chi_square - best.chi_square).abs() < 0.5, "{} and {}", found.chi_square, best.chi_square);
     }
 
-    /// Leverages are the diagonal of a projection: they sum to the number of parameters. What is minimised, and its slopes, agree by differences.
+    /// Leverages are the diagonal of a projection: they sum to the number of parameters. What is minimised, and its
+    /// slopes, agree by differences.
     #[test]
     fn leverages_sum_to_the_parameters_and_slopes_are_those_of_the_value() {
         let shape = Shape::new(vec![Kind::White, Kind::GaussMarkov]);
@@ -526,7 +536,8 @@ mod tests {
                 weights.look(&points, &shape, &moved).half()
             };
             let slope = place.residuals.column(0).dot(&place.residuals.column(j + 1)) + place.lean_slope[j];
-            // differences over 2e-4 of values of about 10: 1e-6 by the third derivative, the derivative by Tc is itself one over 2e-4
+            // differences over 2e-4 of values of about 10: 1e-6 by the third derivative, the derivative by Tc is
+            // itself one over 2e-4
             let found = (value(1e-4) - value(-1e-4)) / 2e-4;
             assert!((found - slope).abs() < 1e-5 * (1.0 + slope.abs()), "{j}: {found} {slope}");
         }

@@ -1,7 +1,8 @@
 //! A datasheet's words to parameters.
 //!
-//! Sources: IEEE Std 952-1997, Annexes B and C (angle random walk N, its floor B √(2 ln 2/π)); the maximum of a Gauss-Markov process's Allan deviation is
-//! 0.6174 σ, at 1.893 Tc; equivalent noise bandwidth of a Butterworth filter of order n: (π/2n)/sin(π/2n) of its −3 dB frequency.
+//! Sources: IEEE Std 952-1997, Annexes B and C (angle random walk N, its floor B √(2 ln 2/π)); the maximum of a
+//! Gauss-Markov process's Allan deviation is 0.6174 σ, at 1.893 Tc; equivalent noise bandwidth of a Butterworth
+//! filter of order n: (π/2n)/sin(π/2n) of its −3 dB frequency.
 
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
 

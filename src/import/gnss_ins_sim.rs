@@ -1,8 +1,9 @@
 //! The dictionary of gnss-ins-sim's IMU model, as Python or JSON.
 //!
-//! Source: Aceinna/gnss-ins-sim, sim/imu_model.py and pathgen/pathgen.py: `gyro_b` and `gyro_b_stability` in deg/h, `gyro_arw` in deg/√h, `accel_vrw` in
-//! m/s/√h, the others in m/s² and s. The drift is b⁺ = (1 − dt/Tc) b + σ √(1 − e^(−2dt/Tc)) n with σ = `b_stability`; where `b_corr` is not there or
-//! infinite it is white noise of the deviation σ, whatever the README says.
+//! Source: Aceinna/gnss-ins-sim, sim/imu_model.py and pathgen/pathgen.py: `gyro_b` and `gyro_b_stability` in deg/h,
+//! `gyro_arw` in deg/√h, `accel_vrw` in m/s/√h, the others in m/s² and s. The drift is b⁺ = (1 − dt/Tc) b + σ √(1 −
+//! e^(−2dt/Tc)) n with σ = `b_stability`; where `b_corr` is not there or infinite it is white noise of the deviation
+//! σ, whatever the README says.
 
 use super::{Imported, Problem, axis, sensor_name};
 use crate::params::{AxisParams, Measured, Params, TermEntry};

@@ -1,10 +1,11 @@
 //! Results of imu_utils, `NAME_imu_param.yaml`, in its dialects.
 //!
-//! gaowenliang/imu_utils, src/gyr_lib/fitallan_gyr.cpp (2cdda91): gyr_n = √rate σ_A(1 s) of its fitted curve, the deviation of one sample, although its
-//! README says density; gyr_w the least value of that curve, no walk. Its unit lines say `rad/s` and `m/s^2`. So they did in early versions (41520b7,
-//! fitallan_gyr.h), which wrote gyr_n = σ_A(1 s), hence N; the results that lie in its data folder are of that kind. No point of a curve is below its
-//! least value: gyr_n/√rate < gyr_w tells an early file. mintar/imu_utils, the same files: gyr_n = N, gyr_w = K, as Kalibr takes them. Its unit
-//! lines name both numbers.
+//! gaowenliang/imu_utils, src/gyr_lib/fitallan_gyr.cpp (2cdda91): gyr_n = √rate σ_A(1 s) of its fitted curve, the
+//! deviation of one sample, although its README says density; gyr_w the least value of that curve, no walk. Its unit
+//! lines say `rad/s` and `m/s^2`. So they did in early versions (41520b7, fitallan_gyr.h), which wrote gyr_n = σ_A(1
+//! s), hence N; the results that lie in its data folder are of that kind. No point of a curve is below its least
+//! value: gyr_n/√rate < gyr_w tells an early file. mintar/imu_utils, the same files: gyr_n = N, gyr_w = K, as Kalibr
+//! takes them. Its unit lines name both numbers.
 
 use super::yaml::Entry;
 use super::{Imported, Problem, axis, measured, sensor_name, three_alike, white_and_walk};
@@ -23,7 +24,8 @@ enum Dialect {
     Densities,
 }
 
-/// An early file's numbers contradict the later meaning by more than the grid of its averaging times, 1 % apart in the deviation.
+/// An early file's numbers contradict the later meaning by more than the grid of its averaging times, 1 % apart in
+/// the deviation.
 const BELOW: f64 = 0.98;
 
 /// Section and its keys.

@@ -1,7 +1,9 @@
-//! Yaml files of continuous densities: Kalibr's imu.yaml, OpenVINS' kalibr_imu_chain.yaml, EuRoC's sensor.yaml (`rate_hz`), ORB-SLAM3's settings.
+//! Yaml files of continuous densities: Kalibr's imu.yaml, OpenVINS' kalibr_imu_chain.yaml, EuRoC's sensor.yaml
+//! (`rate_hz`), ORB-SLAM3's settings.
 //!
-//! Sources: ethz-asl/kalibr, kalibr_common/ConfigReader.py (white noise over √dt there, walks as they are, all four above zero); rpng/open_vins,
-//! ov_msckf/src/state/Propagator.cpp (N²/dt, K² dt); UZ-SLAMLab/ORB_SLAM3, src/ImuTypes.cc (N √f, K/√f). So N and K are as written.
+//! Sources: ethz-asl/kalibr, kalibr_common/ConfigReader.py (white noise over √dt there, walks as they are, all four
+//! above zero); rpng/open_vins, ov_msckf/src/state/Propagator.cpp (N²/dt, K² dt); UZ-SLAMLab/ORB_SLAM3,
+//! src/ImuTypes.cc (N √f, K/√f). So N and K are as written.
 
 use super::yaml::Entry;
 use super::{Imported, Problem, density_unit, sensor_name, three_alike, walk_unit, white_and_walk};

@@ -1,7 +1,7 @@
 //! Noise parameters that other programs and datasheets hold, in params.json's terms (floor 2).
 //!
-//! One file per origin; [`read`] knows a file by its content. Numbers keep the unit in which they are written; what is done with each is said in
-//! words. Sources: the programs' own code, named in each file.
+//! One file per origin; [`read`] knows a file by its content. Numbers keep the unit in which they are written; what
+//! is done with each is said in words. Sources: the programs' own code, named in each file.
 
 pub mod datasheet;
 mod gnss_ins_sim;
@@ -74,8 +74,8 @@ impl Problem {
 
 /// Reads a file of Kalibr, OpenVINS, ORB-SLAM3, imu_utils or gnss-ins-sim.
 ///
-/// `rate_hz`: sample rate of the sensor; it stands before what the file says. Errors: a file that is none of these, numbers or keys that make no
-/// sense, a sample rate that is needed and not there.
+/// `rate_hz`: sample rate of the sensor; it stands before what the file says. Errors: a file that is none of these,
+/// numbers or keys that make no sense, a sample rate that is needed and not there.
 pub fn read(path: &Path, rate_hz: Option<f64>) -> Result<Imported, ImportError> {
     let shown = path.display().to_string();
     let found = text(path).and_then(|text| parse(&text, rate_hz)).map_err(|problem| problem.of(shown.clone()))?;

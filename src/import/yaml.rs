@@ -1,6 +1,7 @@
 //! The YAML of parameter files: `key: value` lines nested by their indentation.
 //!
-//! Not YAML at large: OpenCV's first line `%YAML:1.0` is none of it, and these files hold numbers under names. Lists and matrices are passed over.
+//! Not YAML at large: OpenCV's first line `%YAML:1.0` is none of it, and these files hold numbers under names. Lists
+//! and matrices are passed over.
 
 use super::Problem;
 

@@ -1,5 +1,6 @@
-//! What reading a file may cost: one account of bytes and of work, sized by the file, that every reader draws on. Whatever a file declares, leads
-//! to or unpacks to, the account is asked before room is made for it, and its refusal is the end of the reading.
+//! What reading a file may cost: one account of bytes and of work, sized by the file, that every reader draws on.
+//! Whatever a file declares, leads to or unpacks to, the account is asked before room is made for it, and its
+//! refusal is the end of the reading.
 
 use std::io::{self, Read};
 use std::sync::Arc;
@@ -7,17 +8,19 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::bytes::Short;
 
-/// Bytes of a name, or of a path of names: thrice what MATLAB, HDF5's tools, ULog and ROS allow, and no name then makes a line that nobody reads.
+/// Bytes of a name, or of a path of names: thrice what MATLAB, HDF5's tools, ULog and ROS allow, and no name then
+/// makes a line that nobody reads.
 pub(super) const LONGEST_NAME: usize = 1024;
 /// Levels of structures, groups, types and lists: twice what any log is known to have, and far from the end of a stack.
 pub(super) const DEEPEST: usize = 32;
 
-/// Memory beside the numbers that are kept: so many times the file, and so much beside it. With what the process itself needs, stacks and buffers, this
-/// stays below the 16 MiB that docs/formats.md promises.
+/// Memory beside the numbers that are kept: so many times the file, and so much beside it. With what the process
+/// itself needs, stacks and buffers, this stays below the 16 MiB that docs/formats.md promises.
 const TIMES: u64 = 4;
 const ROOM: u64 = 12 << 20;
-/// Work of a pass, in units of about a nanosecond (a byte that is unpacked): a message of one byte counts [`STEP`], so that no file that is read from the
-/// beginning to its end without being unpacked comes to the limit; the rest is a second.
+/// Work of a pass, in units of about a nanosecond (a byte that is unpacked): a message of one byte counts [`STEP`],
+/// so that no file that is read from the beginning to its end without being unpacked comes to the limit; the rest is
+/// a second.
 const EACH: u64 = 64;
 const SPARE: u64 = 1 << 30;
 /// A record, a field, an element: what is looked at, whatever its length.

@@ -1,7 +1,7 @@
 //! Files of named arrays (MATLAB, HDF5): arrays of one length in one group are the columns of one table.
 //!
-//! Samples run along the longer side of a matrix. Its columns are named after it: `_x, _y, _z` of three, `_w, _x, _y, _z` of four whose name
-//! says quaternion, `_1, _2, …` of any other number, which then say nothing of a sensor.
+//! Samples run along the longer side of a matrix. Its columns are named after it: `_x, _y, _z` of three, `_w, _x,
+//! _y, _z` of four whose name says quaternion, `_1, _2, …` of any other number, which then say nothing of a sensor.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -45,8 +45,8 @@ impl<'a> Bytes<'a> {
     }
 }
 
-/// A frame of Zstandard that is to hold about so many bytes: its window, for which room is made at once, may be as large or 8 MiB, which
-/// every decoder has (RFC 8878, section 3.1.1.1.2).
+/// A frame of Zstandard that is to hold about so many bytes: its window, for which room is made at once, may be as
+/// large or 8 MiB, which every decoder has (RFC 8878, section 3.1.1.1.2).
 pub(super) fn zstd(frame: &[u8], size: u64) -> Result<impl Read + '_, String> {
     let mut decoder = FrameDecoder::new();
     decoder.set_max_window_size(size.clamp(8 << 20, 128 << 20).next_power_of_two());

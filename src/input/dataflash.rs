@@ -1,8 +1,9 @@
 //! ArduPilot DataFlash logs (`.bin`).
 //!
-//! Format: ArduPilot, libraries/AP_Logger: each message is 0xA3, 0x95, its type and its fields; `FMT` messages say how long the messages
-//! of a type are and what their fields are called. Bytes that are no message are passed over and counted. Units are those of the
-//! message documentation of ArduPilot: rad/s, m/s/s, degC, and time by the name of its field. Batches of raw samples are topics of their own.
+//! Format: ArduPilot, libraries/AP_Logger: each message is 0xA3, 0x95, its type and its fields; `FMT` messages say
+//! how long the messages of a type are and what their fields are called. Bytes that are no message are passed over
+//! and counted. Units are those of the message documentation of ArduPilot: rad/s, m/s/s, degC, and time by the name
+//! of its field. Batches of raw samples are topics of their own.
 
 mod batch;
 

@@ -1,9 +1,11 @@
-//! HDF5 files, which MATLAB files of version 7.3 are: datasets of numbers with one or two dimensions, or records of numbers.
+//! HDF5 files, which MATLAB files of version 7.3 are: datasets of numbers with one or two dimensions, or records of
+//! numbers.
 //!
-//! Format: The HDF Group, "HDF5 File Format Specification", version 3.0. Read are the structures that h5py, MATLAB and the C library write by
-//! default (superblock 0 to 3, object headers 1 and 2, groups as symbol tables or as links in the header; compact, contiguous and
-//! chunked data with the filters deflate, shuffle, Fletcher-32 and LZF). What only `libver="latest"` writes (dense groups, some
-//! chunk indexes) is named and refused. Every length is compared with the file's before it is read.
+//! Format: The HDF Group, "HDF5 File Format Specification", version 3.0. Read are the structures that h5py, MATLAB
+//! and the C library write by default (superblock 0 to 3, object headers 1 and 2, groups as symbol tables or as
+//! links in the header; compact, contiguous and chunked data with the filters deflate, shuffle, Fletcher-32 and
+//! LZF). What only `libver="latest"` writes (dense groups, some chunk indexes) is named and refused. Every length is
+//! compared with the file's before it is read.
 
 mod chunks;
 mod datatype;

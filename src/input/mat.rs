@@ -1,7 +1,8 @@
 //! MATLAB files of level 5 (`save -v6`, `-v7`): numeric arrays, also inside structures.
 //!
-//! Format: MathWorks, "MAT-File Format", chapter 1. Opening inflates no more of a variable than its name and shape; numbers
-//! are read when they are selected, straight into the columns. Cells, text, sparse and complex matrices are passed over, objects named.
+//! Format: MathWorks, "MAT-File Format", chapter 1. Opening inflates no more of a variable than its name and shape;
+//! numbers are read when they are selected, straight into the columns. Cells, text, sparse and complex matrices are
+//! passed over, objects named.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};

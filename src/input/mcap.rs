@@ -1,4 +1,5 @@
-//! MCAP files: <https://mcap.dev/spec>. Read from the beginning without the index, so that a file that was not closed is read as well.
+//! MCAP files: <https://mcap.dev/spec>. Read from the beginning without the index, so that a file that was not
+//! closed is read as well.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -1,4 +1,5 @@
-//! Log files to [`Recording`] (floor 2): recognise the format, choose columns, units and rate, read in one or two streaming passes.
+//! Log files to [`Recording`] (floor 2): recognise the format, choose columns, units and rate, read in one or two
+//! streaming passes.
 
 mod account;
 mod arrays;
@@ -57,7 +58,8 @@ pub struct LogOptions {
     /// Seconds from the start of the log.
     pub start_s: Option<f64>,
     pub end_s: Option<f64>,
-    /// What the values are: rate (default), increments over one sample, or the running integral. The unit's dimension must agree.
+    /// What the values are: rate (default), increments over one sample, or the running integral. The unit's
+    /// dimension must agree.
     pub kind: InputKind,
     /// Prefer this quantity when the log holds both (default angular rate).
     pub quantity: Option<Quantity>,
@@ -117,7 +119,8 @@ pub struct Block {
     pub time_s: Vec<f64>,
 }
 
-/// The rows between `--start` and `--end`: from the first row at or after the start to the last before one beyond the end.
+/// The rows between `--start` and `--end`: from the first row at or after the start to the last before one beyond
+/// the end.
 #[derive(Clone, Debug)]
 struct Selection {
     start_s: f64,
@@ -132,8 +135,8 @@ impl Selection {
         let (start_s, end_s) = (options.start_s.unwrap_or(f64::NEG_INFINITY), options.end_s.unwrap_or(f64::INFINITY));
         Selection { start_s, end_s, seen: 0, started: false }
     }
-    /// The part of a block that is wanted, and whether nothing can follow. `time(i, row)`: seconds of row i of the block,
-    /// which is the given row of the file.
+    /// The part of a block that is wanted, and whether nothing can follow. `time(i, row)`: seconds of row i of the
+    /// block, which is the given row of the file.
     fn take(&mut self, rows: usize, time: impl Fn(usize, u64) -> f64) -> (Range<usize>, bool) {
         let seen = self.seen;
         self.seen += rows as u64;
@@ -277,7 +280,8 @@ impl Log {
         }
     }
 
-    /// The checking pass; every wanted row is kept in the columns given, if any. Rows are checked and kept while the next ones are read.
+    /// The checking pass; every wanted row is kept in the columns given, if any. Rows are checked and kept while the
+    /// next ones are read.
     fn scan(&mut self, kept: &mut [Vec<f64>]) -> Result<Scan, InputError> {
         let mut period = None;
         loop {
@@ -387,7 +391,8 @@ impl Log {
     }
 }
 
-/// A log opened for streaming with bounded memory: one checking pass is made at `open`, blocks are then read in a second pass.
+/// A log opened for streaming with bounded memory: one checking pass is made at `open`, blocks are then read in a
+/// second pass.
 pub struct LogReader {
     log: Log,
     scan: Scan,

@@ -1,7 +1,7 @@
 //! Column names: the words in them, and the unit in brackets or behind the name.
 //!
-//! A name is cut into words (`UncompGyroX` is `uncomp gyro x`). Words say which sensor and which axis a column is; a unit
-//! in brackets (`gyro_x (deg/s)`) or behind the name (`gyr_x_dps`) says its unit.
+//! A name is cut into words (`UncompGyroX` is `uncomp gyro x`). Words say which sensor and which axis a column is; a
+//! unit in brackets (`gyro_x (deg/s)`) or behind the name (`gyr_x_dps`) says its unit.
 
 use crate::units::{Quantity, Unit, plain};
 
@@ -346,7 +346,8 @@ pub(super) fn axis_at(words: &[String]) -> Option<usize> {
         .or_else(|| words.len().checked_sub(1).filter(|&i| i > 0 && digit(&words[i])))
 }
 
-/// True for a column about a sensor that is not its output: truth, bias, standard deviation, magnetometer, temperature …
+/// True for a column about a sensor that is not its output: truth, bias, standard deviation, magnetometer,
+/// temperature …
 pub(super) fn is_excluded(words: &[String]) -> bool {
     is_temperature(words) || words.iter().any(|w| NOT_A_SENSOR.contains(&w.as_str()))
 }

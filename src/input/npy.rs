@@ -1,7 +1,8 @@
 //! NumPy .npy arrays: one- or two-dimensional numbers in either memory order, or one-dimensional structured arrays.
 //!
-//! Format: NumPy enhancement proposal 1, versions 1.0 to 3.0. The length of the file is compared with the declared shape before
-//! anything is read; memory is one block. Python objects are refused: reading them would mean running a pickle.
+//! Format: NumPy enhancement proposal 1, versions 1.0 to 3.0. The length of the file is compared with the declared
+//! shape before anything is read; memory is one block. Python objects are refused: reading them would mean running a
+//! pickle.
 
 mod header;
 

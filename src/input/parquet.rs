@@ -1,7 +1,8 @@
 //! Parquet: flat columns of numbers, row group by row group.
 //!
-//! Format: Apache Parquet, parquet-format 2.x. The crate `parquet` reads metadata, pages and encodings; compressed pages are unpacked by
-//! `pages`. Text, lists and maps are passed over; the fields of a structure are the columns `imu.gyro_x`.
+//! Format: Apache Parquet, parquet-format 2.x. The crate `parquet` reads metadata, pages and encodings; compressed
+//! pages are unpacked by `pages`. Text, lists and maps are passed over; the fields of a structure are the columns
+//! `imu.gyro_x`.
 
 mod guard;
 mod pages;

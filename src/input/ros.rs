@@ -1,7 +1,7 @@
 //! Bags: files of messages on named topics (ROS 1 bag, MCAP, ROS 2 sqlite), of which `sensor_msgs/Imu` are read.
 //!
-//! Units are those of the message definition and REP 103: rad/s, m/s². The time of a row is that of the message header, in nanoseconds; when it
-//! was recorded is `log_time`.
+//! Units are those of the message definition and REP 103: rad/s, m/s². The time of a row is that of the message
+//! header, in nanoseconds; when it was recorded is `log_time`.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -1,5 +1,5 @@
-//! ROS 1 bags, version 2.0: <http://wiki.ros.org/Bags/Format/2.0>. Read from the beginning without the index, so that a bag that was
-//! not closed is read as well.
+//! ROS 1 bags, version 2.0: <http://wiki.ros.org/Bags/Format/2.0>. Read from the beginning without the index, so
+//! that a bag that was not closed is read as well.
 
 use std::collections::BTreeMap;
 use std::path::Path;

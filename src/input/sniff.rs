@@ -1,4 +1,5 @@
-//! What a text log looks like: delimiter, decimal sign, header, first row of numbers; found from the beginning of the file.
+//! What a text log looks like: delimiter, decimal sign, header, first row of numbers; found from the beginning of
+//! the file.
 
 use super::account::Account;
 use super::names::{Head, is_rate};
@@ -97,7 +98,8 @@ pub(super) fn is_comment(line: &[u8]) -> bool {
     line.starts_with(b"#") || line.starts_with(b"%") || line.starts_with(b"//")
 }
 
-/// The number in a field: NaN for an empty field, the usual words for a missing value, and infinity; `None` for other text.
+/// The number in a field: NaN for an empty field, the usual words for a missing value, and infinity; `None` for
+/// other text.
 pub(super) fn number(field: &[u8], decimal_comma: bool) -> Option<f64> {
     if field.is_empty() {
         return Some(f64::NAN);
@@ -154,7 +156,8 @@ struct Line<'a> {
     text: &'a [u8],
 }
 
-/// The form of the log that begins with `sample` (without byte-order mark; `whole`: nothing follows), or why it is none.
+/// The form of the log that begins with `sample` (without byte-order mark; `whole`: nothing follows), or why it is
+/// none.
 pub(super) fn layout(sample: &[u8], whole: bool, account: &Account) -> Result<Layout, String> {
     const LINES: usize = 4000;
     let (mut body, mut comments) = (Vec::new(), Vec::new());
@@ -290,7 +293,8 @@ fn describe(
     Ok(layout)
 }
 
-/// `// Update Rate: 100.0Hz`, `Sample rate (Hz),100`; `Fs,100` means hertz, as in the files of arrays. Other names must say it.
+/// `// Update Rate: 100.0Hz`, `Sample rate (Hz),100`; `Fs,100` means hertz, as in the files of arrays. Other names
+/// must say it.
 fn said_rate(line: &str) -> Option<(String, f64)> {
     let (name, value) = line.trim_matches(|c: char| "#%/\" \t".contains(c)).split_once([':', '=', ',', ';', '\t'])?;
     let (name, value) = (name.trim_matches([' ', '"']), value.trim_matches([' ', '"', ',', ';', '\t']));

@@ -186,7 +186,8 @@ pub(super) fn choose(
     fail(format!("{wanted}; choose with `topic` and `columns`; {}", there_are(topics)))
 }
 
-/// `there are imu (100 rows: time gyro_x gyro_y), …`, those with a sensor first; columns only where the list stays short.
+/// `there are imu (100 rows: time gyro_x gyro_y), …`, those with a sensor first; columns only where the list stays
+/// short.
 fn there_are(topics: &[Topic]) -> String {
     const MOST: usize = 40;
     const WITH_COLUMNS: usize = 6;

@@ -1,6 +1,7 @@
 //! ROS 2 bags in a database (`.db3`): the tables `topics` and `messages`, read straight from the pages.
 //!
-//! Format: <https://www.sqlite.org/fileformat2.html>, tables only. What a write-ahead log beside the file holds is not read.
+//! Format: <https://www.sqlite.org/fileformat2.html>, tables only. What a write-ahead log beside the file holds is
+//! not read.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -91,7 +92,8 @@ impl Pages {
         Ok(page)
     }
 
-    /// Content of a cell of a leaf: the number of its row, and the row. `left`: bytes that cells of this page may still have.
+    /// Content of a cell of a leaf: the number of its row, and the row. `left`: bytes that cells of this page may
+    /// still have.
     fn cell(&mut self, page: &[u8], at: usize, left: &mut usize) -> Result<(u64, Vec<u8>), Fault> {
         self.account.work(STEP)?;
         let mut bytes = Bytes(page.get(at..).ok_or(Short)?);

@@ -19,7 +19,8 @@ pub enum TemperatureColumn {
 }
 
 impl Table<'_> {
-    /// The temperature beside `axes` of this quantity. What cannot be decided is an error where a flag asks for it, else a note.
+    /// The temperature beside `axes` of this quantity. What cannot be decided is an error where a flag asks for it,
+    /// else a note.
     pub(super) fn temperature(
         &self,
         wanted: &TemperatureColumn,

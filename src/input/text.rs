@@ -52,8 +52,8 @@ pub(super) struct TextTable {
 /// The bytes of the log.
 struct Source {
     reader: Box<dyn BufRead + Send>,
-    /// The most that is asked for at once: of compressed bytes always through the buffer, so that one that is damaged is read as far
-    /// whoever reads.
+    /// The most that is asked for at once: of compressed bytes always through the buffer, so that one that is
+    /// damaged is read as far whoever reads.
     step: usize,
 }
 

@@ -1,8 +1,9 @@
 //! PX4 ULog.
 //!
-//! Format: PX4 user guide, "ULog File Format", version 1. Messages are read one by one. A file that ends inside a message is read
-//! up to there; where a message makes no sense, reading goes on behind the next synchronisation message, and a note says how
-//! many bytes were passed over. Data that was appended after a crash is found by the offsets in the flag message.
+//! Format: PX4 user guide, "ULog File Format", version 1. Messages are read one by one. A file that ends inside a
+//! message is read up to there; where a message makes no sense, reading goes on behind the next synchronisation
+//! message, and a note says how many bytes were passed over. Data that was appended after a crash is found by the
+//! offsets in the flag message.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fs::File;

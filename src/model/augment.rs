@@ -16,12 +16,14 @@ pub struct InitialBias {
     pub std_dev: f64,
 }
 
-/// Errors of a sensor of one axis at rest: z_k = bias + Σ h_i x_i + w_k, states "bias" and those of every noise process, in the fixed
-/// order of [`Kind`], block-diagonal F, Q, P0, each block discretised exactly by its process; R = (Σ N²)/dt.
+/// Errors of a sensor of one axis at rest: z_k = bias + Σ h_i x_i + w_k, states "bias" and those of every noise
+/// process, in the fixed order of [`Kind`], block-diagonal F, Q, P0, each block discretised exactly by its process;
+/// R = (Σ N²)/dt.
 ///
-/// `dt` in s; `horizon_s` is the slowest time constant that flicker must cover. `bias` is the constant part; without it there is
-/// no "bias" state. State names are unique: "gauss_markov", "gauss_markov.2". P0 of a process is that of its realisation.
-/// Errors: `dt`, `horizon_s` or the bias spread out of range, a line not below half the sample rate, or no white noise.
+/// `dt` in s; `horizon_s` is the slowest time constant that flicker must cover. `bias` is the constant part; without
+/// it there is no "bias" state. State names are unique: "gauss_markov", "gauss_markov.2". P0 of a process is that of
+/// its realisation. Errors: `dt`, `horizon_s` or the bias spread out of range, a line not below half the sample
+/// rate, or no white noise.
 pub fn sensor_errors(
     quantity: Quantity,
     noise: &NoiseModel,
@@ -57,8 +59,8 @@ pub fn sensor_errors(
     Ok(model)
 }
 
-/// Errors of an aid that measures `output`: white noise of standard deviation `std_dev` per measurement, and a Gauss-Markov
-/// process (`std_dev`, correlation time in s) where there is one; SI.
+/// Errors of an aid that measures `output`: white noise of standard deviation `std_dev` per measurement, and a
+/// Gauss-Markov process (`std_dev`, correlation time in s) where there is one; SI.
 ///
 /// Errors: a value not greater than zero.
 pub fn aid_errors(
@@ -129,8 +131,8 @@ pub enum Port {
 /// A sensor or aid of a plant.
 #[derive(Clone, Copy, Debug)]
 pub struct Attached<'a> {
-    /// Of its measurement; stands before the names of its states (`heading.gauss_markov`). Empty for the sensor that the design is
-    /// of: its measurement has the name of the port, its states have their own.
+    /// Of its measurement; stands before the names of its states (`heading.gauss_markov`). Empty for the sensor that
+    /// the design is of: its measurement has the name of the port, its states have their own.
     pub name: &'a str,
     /// One measurement: from [`sensor_errors`] or [`aid_errors`].
     pub errors: &'a LinearModel,
@@ -143,8 +145,8 @@ pub struct Attached<'a> {
 #[derive(Clone, Debug)]
 pub struct Augmented {
     pub model: LinearModel,
-    /// Process noise that is not of a state of its own: "motion" of the plant, "white" of a sensor at an input ("heading.white").
-    /// The rest of Q belongs to the state it stands at.
+    /// Process noise that is not of a state of its own: "motion" of the plant, "white" of a sensor at an input
+    /// ("heading.white"). The rest of Q belongs to the state it stands at.
     pub noise: Vec<(String, DMatrix<f64>)>,
 }
 
@@ -153,11 +155,13 @@ pub struct Augmented {
 /// With e_k = H_s s_k + w_k the error of a sensor, s_{k+1} = F_s s_k + v and var w = R_s (N²/dt of white noise):
 ///
 /// - at an output y = H_p x the sensor is a measurement, z = H_p x + H_s s + w, a row of H and R;
-/// - at an input it drives the plant, x_{k+1} = F_p x_k + G_p (u_k − e_k) + v: F has −G_p H_s beside F_p, Q has G_p R_s G_pᵀ.
+/// - at an input it drives the plant, x_{k+1} = F_p x_k + G_p (u_k − e_k) + v: F has −G_p H_s beside F_p, Q has G_p
+///   R_s G_pᵀ.
 ///
-/// This is the sampled form: the error is held over a sample, as the sensor's sample is. The continuous form of a gyro with a Gauss-Markov
-/// drift is [`angle_and_drift`](super::discretize::angle_and_drift); they agree to O(dt/Tc). A plant with states has its states and the
-/// drift of the first sensor as `outputs`. Errors: a state name that stands twice, and what [`LinearModel::check`] says.
+/// This is the sampled form: the error is held over a sample, as the sensor's sample is. The continuous form of a
+/// gyro with a Gauss-Markov drift is [`angle_and_drift`](super::discretize::angle_and_drift); they agree to
+/// O(dt/Tc). A plant with states has its states and the drift of the first sensor as `outputs`. Errors: a state name
+/// that stands twice, and what [`LinearModel::check`] says.
 pub fn augment(plant: &Plant, sensors: &[Attached<'_>]) -> Result<Augmented, ModelError> {
     let own = plant.states.len();
     let n = own + sensors.iter().map(|sensor| sensor.errors.states.len()).sum::<usize>();
@@ -279,8 +283,8 @@ fn unique(name: &str, taken: &[Named]) -> String {
     std::iter::once(name.to_owned()).chain(numbered).find(|candidate| free(candidate)).unwrap_or_default()
 }
 
-/// SI unit of a state: quantisation errors are those of the integrated quantity, a slope is the quantity per second, every
-/// other state the quantity itself.
+/// SI unit of a state: quantisation errors are those of the integrated quantity, a slope is the quantity per second,
+/// every other state the quantity itself.
 fn unit(name: &str, quantity: Quantity) -> &'static str {
     let (integral, itself, slope) = match quantity {
         Quantity::AngularRate => ("rad", quantity.si_unit(), "rad/s^2"),

@@ -7,9 +7,10 @@ pub use crate::numerics::van_loan::van_loan;
 /// Angle error and first-order Gauss-Markov drift of a gyro whose rate is integrated, states [θ, b]:
 /// θ̇ = u − b − w, ḃ = −b/Tc + w_b. Returns F and Qd over one step.
 ///
-/// With x = dt/Tc and om = 1 − e^−x: F = [[1, −Tc om], [0, 1 − om]], Q22 = σ²(1 − e^−2x), Q12 = −σ² Tc om²,
-/// Q11 = N² dt + 2 σ² Tc² (x − 2 om + (1 − e^−2x)/2). The bracket of Q11 is ∫₀^x (1 − e^−s)² ds, about x³/3: below x = 1.5 it
-/// is summed as a series, since its terms cancel. `density` N in u/√Hz, `std_dev` σ in u, `correlation_time` Tc and `dt` in s.
+/// With x = dt/Tc and om = 1 − e^−x: F = [[1, −Tc om], [0, 1 − om]], Q22 = σ²(1 − e^−2x), Q12 = −σ² Tc om², Q11 = N²
+/// dt + 2 σ² Tc² (x − 2 om + (1 − e^−2x)/2). The bracket of Q11 is ∫₀^x (1 − e^−s)² ds, about x³/3: below x = 1.5 it
+/// is summed as a series, since its terms cancel. `density` N in u/√Hz, `std_dev` σ in u, `correlation_time` Tc and
+/// `dt` in s.
 pub fn angle_and_drift(density: f64, std_dev: f64, correlation_time: f64, dt: f64) -> (Matrix2<f64>, Matrix2<f64>) {
     let x = dt / correlation_time;
     let om = -(-x).exp_m1();

@@ -37,7 +37,8 @@ pub struct Output {
 /// Name of the output that is the drift of the sensor.
 pub const DRIFT: &str = "drift";
 
-/// A named discrete-time linear model x_{k+1} = F x_k + G u_k + v, z_k = H x_k + w, v ~ N(0,Q), w ~ N(0,R), x_0 ~ N(x0, P0). SI.
+/// A named discrete-time linear model x_{k+1} = F x_k + G u_k + v, z_k = H x_k + w, v ~ N(0,Q), w ~ N(0,R), x_0 ~
+/// N(x0, P0). SI.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearModel {
     pub dt: f64,
@@ -78,8 +79,9 @@ impl ModelError {
 }
 
 impl LinearModel {
-    /// Times x it is the whole drift of the sensor, which is subtracted from what it measures: the output "drift"; where there is none,
-    /// the first row of H without quantisation, moving averages, band limits and oscillations, which are noise although they need states.
+    /// Times x it is the whole drift of the sensor, which is subtracted from what it measures: the output "drift";
+    /// where there is none, the first row of H without quantisation, moving averages, band limits and oscillations,
+    /// which are noise although they need states.
     pub fn drift_row(&self) -> DMatrix<f64> {
         if let Some(output) = self.outputs.iter().find(|output| output.name == DRIFT) {
             return DMatrix::from_row_slice(1, output.row.len(), &output.row);

@@ -20,7 +20,8 @@ const LARGEST_POWER: f64 = 1e60;
 pub struct Observability {
     /// Number of independent combinations of states that the measurements determine.
     pub rank: usize,
-    /// Largest over smallest counted singular value, columns scaled to unit length: how unequally well they are determined.
+    /// Largest over smallest counted singular value, columns scaled to unit length: how unequally well they are
+    /// determined.
     pub condition: f64,
     /// Time over which the rows were taken, s: several times the slowest time constant.
     pub span_s: f64,
@@ -32,9 +33,9 @@ pub struct Observability {
     pub sentences: Vec<String>,
 }
 
-/// Rank, condition and unobservable directions from the singular values of the observability matrix with rows h F^j/√r for
-/// j = 0, 1, …, n − 1 and then 1, 2, 4, 8 … up to four times the slowest time constant, j counting the samples at which the measurement
-/// is taken, each column scaled to length one.
+/// Rank, condition and unobservable directions from the singular values of the observability matrix with rows h
+/// F^j/√r for j = 0, 1, …, n − 1 and then 1, 2, 4, 8 … up to four times the slowest time constant, j counting the
+/// samples at which the measurement is taken, each column scaled to length one.
 ///
 /// Rows that far apart are needed because consecutive samples of a slow drift and of a constant look alike to rounding.
 /// Errors: entries that are not finite.
@@ -62,8 +63,9 @@ pub fn observability(model: &LinearModel) -> Result<Observability, LinalgError> 
     Ok(result)
 }
 
-/// Indices of states that nothing drives and that do not decay: no process noise on them or on any state that feeds them,
-/// and poles on (or outside) the unit circle. A measurement that sees them drives their variance to zero, like 1/t.
+/// Indices of states that nothing drives and that do not decay: no process noise on them or on any state that feeds
+/// them, and poles on (or outside) the unit circle. A measurement that sees them drives their variance to zero, like
+/// 1/t.
 pub fn undriven_states(model: &LinearModel) -> Vec<usize> {
     let n = model.states.len();
     let mut still: Vec<bool> = (0..n).map(|i| model.q[(i, i)] == 0.0).collect();

@@ -1,4 +1,5 @@
-//! Replicates of the gate: they set its critical value and, with other random numbers, measure its false-alarm probability.
+//! Replicates of the gate: they set its critical value and, with other random numbers, measure its false-alarm
+//! probability.
 
 use rayon::prelude::*;
 
@@ -9,11 +10,13 @@ use super::law::Law;
 use super::outcome::{Caught, FalseAlarmRate, Method, TestRate};
 use crate::numerics::distribution::normal_quantile;
 
-/// Replicates drawn for the critical value: a family-wise alpha of 0.01 is then met within 5 % of itself (one standard deviation).
+/// Replicates drawn for the critical value: a family-wise alpha of 0.01 is then met within 5 % of itself (one
+/// standard deviation).
 pub const REPLICATES: u64 = 50_000;
 /// Further replicates that measure the false-alarm probability.
 const MEASURED: u64 = 20_000;
-/// Run numbers are below this; from here on they belong to the whole experiments that measure the false-alarm probability.
+/// Run numbers are below this; from here on they belong to the whole experiments that measure the false-alarm
+/// probability.
 pub const MAX_RUN: u64 = 1 << 40;
 /// Most whole experiments that can be asked for: their run numbers stay below 2⁶⁰.
 pub const MAX_REPLICATES: u64 = 1_000_000;
@@ -64,7 +67,8 @@ fn whole_experiment(course: &Course, runs: u64, number: u64) -> Vec<Vec<f64>> {
     course.axes.iter().zip(&totals).map(|(axis, totals)| conclusion::raw_p_values(axis, totals, runs)).collect()
 }
 
-/// Whole experiments: how often some test of some axis has a p-value of at most `critical`; `gates`: one per axis of `course`.
+/// Whole experiments: how often some test of some axis has a p-value of at most `critical`; `gates`: one per axis of
+/// `course`.
 pub fn caught_of_experiments(
     course: &Course,
     gates: &[AxisGate],

@@ -9,12 +9,14 @@ use crate::numerics::random::{StreamId, fill_normal, stream};
 /// Directions over which the absolute value is averaged.
 const DIRECTIONS: usize = 1024;
 
-/// Noncredibility and inclination indices of errors with the mean log₁₀ NEES `mean_log` and the moments E[u uᵀ] (lower triangles by
-/// rows) of the whitened errors u of `size` components; `independent`: number of independent errors in the means.
+/// Noncredibility and inclination indices of errors with the mean log₁₀ NEES `mean_log` and the moments E[u uᵀ]
+/// (lower triangles by rows) of the whitened errors u of `size` components; `independent`: number of independent
+/// errors in the means.
 ///
-/// With ε = eᵀP⁻¹e and ε* = eᵀΣ⁻¹e, Σ the true mean-square error: NCI = 10 E|log₁₀(ε/ε*)| and inclination I = 10 E[log₁₀(ε/ε*)] (Li & Zhao 2005,
-/// FUSION). ε* ~ χ²(n), so E log₁₀ ε* = (ψ(n/2) + ln 2)/ln 10; with u = P^-½ e, ε/ε* = vᵀS v for a uniform direction v and S = E[u uᵀ], which is
-/// averaged over 1024 fixed directions (one component needs none).
+/// With ε = eᵀP⁻¹e and ε* = eᵀΣ⁻¹e, Σ the true mean-square error: NCI = 10 E|log₁₀(ε/ε*)| and inclination I = 10
+/// E[log₁₀(ε/ε*)] (Li & Zhao 2005, FUSION). ε* ~ χ²(n), so E log₁₀ ε* = (ψ(n/2) + ln 2)/ln 10; with u = P^-½ e, ε/ε* =
+/// vᵀS v for a uniform direction v and S = E[u uᵀ], which is averaged over 1024 fixed directions (one component
+/// needs none).
 pub(super) fn credibility(mean_log: f64, moments: &[Vec<f64>], size: usize, independent: f64) -> Option<Credibility> {
     // an eigenvalue search would not end on what is not finite
     if moments.is_empty() || !mean_log.is_finite() || moments.iter().flatten().any(|m| !m.is_finite()) {

@@ -25,15 +25,16 @@ enum Format {
     MonteCarlo1,
 }
 
-/// A Monte Carlo experiment: `runs` of it, their sums, and the verdict on them. A document of interrupted work has no tests.
+/// A Monte Carlo experiment: `runs` of it, their sums, and the verdict on them. A document of interrupted work has
+/// no tests.
 #[derive(Serialize, JsonSchema)]
 #[schemars(rename = "MonteCarlo")]
 struct Document {
     format: Format,
     #[serde(flatten)]
     outcome: Outcome,
-    /// What decides every number: `filter` and `truth` as documents, `truth_spread`, `steps`, `seed`, `alpha`, `replicates`. Documents
-    /// with equal experiments and adjoining runs can be merged.
+    /// What decides every number: `filter` and `truth` as documents, `truth_spread`, `steps`, `seed`, `alpha`,
+    /// `replicates`. Documents with equal experiments and adjoining runs can be merged.
     experiment: Value,
     sums: Vec<AxisSums>,
 }
@@ -42,9 +43,9 @@ struct Document {
 #[derive(Serialize, JsonSchema)]
 struct AxisSums {
     axis: String,
-    /// Each sum as the doubles that add up to it exactly. Per time of the NEES curve: log₁₀ NEES, u, u uᵀ (lower triangle by rows) with u the
-    /// whitened error; then per measurement Σy, Σy², Σ y_k y_(k−h), Σ (block sum)²/length, periodogram.
-    /// Null stands for a sum that is not finite.
+    /// Each sum as the doubles that add up to it exactly. Per time of the NEES curve: log₁₀ NEES, u, u uᵀ (lower
+    /// triangle by rows) with u the whitened error; then per measurement Σy, Σy², Σ y_k y_(k−h), Σ (block
+    /// sum)²/length, periodogram. Null stands for a sum that is not finite.
     #[schemars(with = "Vec<Vec<Option<f64>>>")]
     values: Vec<Vec<f64>>,
     /// Per time and component: runs within 1, 2, 3 sigma; then per measurement the NIS histogram.
@@ -205,7 +206,8 @@ impl Shard {
     }
 }
 
-/// What no `runs` runs can add up to, whatever the truth: counts that do not belong to so many runs, or sums against Cauchy and Schwarz.
+/// What no `runs` runs can add up to, whatever the truth: counts that do not belong to so many runs, or sums against
+/// Cauchy and Schwarz.
 ///
 /// Sums that are not finite are those of a truth that runs away; nothing is said about them.
 fn impossible(totals: &Totals, axis: &AxisCourse, runs: u64) -> Option<String> {

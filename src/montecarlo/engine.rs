@@ -38,8 +38,8 @@ impl Course {
 
     /// Sums over `runs`, one per axis. Who waits hears of each run of each axis.
     ///
-    /// Every random number is addressed by (seed, run, axis, source) and the sums are exact: any number of threads, any cut into ranges
-    /// gives the same.
+    /// Every random number is addressed by (seed, run, axis, source) and the sums are exact: any number of threads,
+    /// any cut into ranges gives the same.
     pub fn sums(&self, runs: Range<u64>) -> Vec<Totals> {
         let groups = (runs.end - runs.start).div_ceil(LANES as u64);
         let zero = || self.axes.iter().map(|axis| Totals::new(&axis.layout)).collect::<Vec<_>>();
@@ -91,8 +91,9 @@ impl Course {
         Some(Truth::of(models.each_ref()))
     }
 
-    /// [`sums`](Course::sums) in batches of a fraction of a second; after each, `pause` is given the sums so far and the number of the
-    /// next run, and says whether to stop. Returns the sums and the end of the range that was done.
+    /// [`sums`](Course::sums) in batches of a fraction of a second; after each, `pause` is given the sums so far and
+    /// the number of the next run, and says whether to stop. Returns the sums and the end of the range that was
+    /// done.
     pub fn sums_until(
         &self,
         runs: Range<u64>,
@@ -126,7 +127,8 @@ impl Course {
         (0..).zip(&self.axes).map(|(number, axis)| one(number, axis)).collect()
     }
 
-    /// Eight runs, `first` and those after it, at every `every`-th step: what a figure needs, however long a run is. By axis, then by run.
+    /// Eight runs, `first` and those after it, at every `every`-th step: what a figure needs, however long a run is.
+    /// By axis, then by run.
     pub fn paths(&self, first: u64, every: u64) -> Vec<Vec<Path>> {
         let one = |number: u32, axis: &AxisCourse| {
             let mut paths = Paths { every: every.max(1), runs: std::array::from_fn(|_| Path::new(axis)) };

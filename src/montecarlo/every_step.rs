@@ -17,7 +17,8 @@ use crate::filter::judge::Judge;
 use crate::numerics::distribution::chi_square_quantile;
 use crate::numerics::linalg::cholesky_in_place;
 
-/// Runs whose sums are taken one after the other; sums of such blocks are added in order, so that threads leave no trace.
+/// Runs whose sums are taken one after the other; sums of such blocks are added in order, so that threads leave no
+/// trace.
 const BLOCK: u64 = 64;
 /// Blocks under way at once: memory does not grow with the runs.
 const WAVE: u64 = 8;
@@ -37,8 +38,9 @@ pub struct EveryStep {
 }
 
 impl EveryStep {
-    /// Between these the mean of a true filter's NEES (`components` of it), or NIS (1), is with probability 1 − alpha at one step:
-    /// χ² quantiles over N runs × components (Bar-Shalom, Li and Kirubarajan 2001, section 5.4.2).
+    /// Between these the mean of a true filter's NEES (`components` of it), or NIS (1), is with probability 1 −
+    /// alpha at one step: χ² quantiles over N runs × components (Bar-Shalom, Li and Kirubarajan 2001, section
+    /// 5.4.2).
     pub fn bounds(&self, components: usize, alpha: f64) -> [f64; 2] {
         let degrees = (self.runs * components as u64) as f64;
         [0.5 * alpha, 1.0 - 0.5 * alpha].map(|p| chi_square_quantile(p, degrees) / degrees)
@@ -76,8 +78,8 @@ fn whitening(axis: &AxisCourse) -> Whitening {
     Whitening { of_truth: of.next().unwrap_or_default(), of_estimate: of.next().unwrap_or_default() }
 }
 
-/// L⁻¹ A by rows, with A = `of` by columns and L Lᵀ = B P Bᵀ; NaN where that is singular. P by columns; scratch is of c n and c² numbers for
-/// c components.
+/// L⁻¹ A by rows, with A = `of` by columns and L Lᵀ = B P Bᵀ; NaN where that is singular. P by columns; scratch is
+/// of c n and c² numbers for c components.
 fn whitening_at(judge: &Judge, p: &[f64], [product, root]: [&mut [f64]; 2], of: &[f64], whiten: &mut [f64]) {
     let (c, n, b) = (judge.size(), judge.of_estimate.ncols(), judge.of_estimate.as_slice());
     // B P, then B P Bᵀ, by columns
@@ -161,7 +163,8 @@ fn add(total: &mut [f64], more: &[f64]) {
 }
 
 impl Course {
-    /// Averages over `runs`, the same runs as those of [`sums`](Course::sums), per axis. At most [`MAX_EVERY_STEP`] steps.
+    /// Averages over `runs`, the same runs as those of [`sums`](Course::sums), per axis. At most [`MAX_EVERY_STEP`]
+    /// steps.
     pub fn every_step(&self, runs: Range<u64>) -> Vec<EveryStep> {
         (0..).zip(&self.axes).map(|(number, axis)| self.every_step_of(number, axis, runs.clone())).collect()
     }
@@ -205,7 +208,8 @@ impl Course {
         EveryStep { nees, nis, components, runs: count }
     }
 
-    /// Sums over the runs of a block. All of them take a chunk of steps before any takes the next: gains and whitening are read once.
+    /// Sums over the runs of a block. All of them take a chunk of steps before any takes the next: gains and
+    /// whitening are read once.
     fn block(&self, number: u32, runs: Range<u64>, scratch: &mut Scratch) {
         let (axis, arch) = (&self.axes[number as usize], Arch::new());
         scratch.judged.iter_mut().for_each(Judged::clear);

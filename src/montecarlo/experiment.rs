@@ -131,8 +131,9 @@ impl Experiment {
     }
 }
 
-/// Samples of a run where its length is not given: 600 s; for filters that settle more slowly twice the longest settling time, of those that
-/// this makes at most `MOST_BY_DEFAULT` samples. It depends on the design alone, so that more runs go on from fewer.
+/// Samples of a run where its length is not given: 600 s; for filters that settle more slowly twice the longest
+/// settling time, of those that this makes at most `MOST_BY_DEFAULT` samples. It depends on the design alone, so
+/// that more runs go on from fewer.
 pub fn default_steps(design: &FilterDesign) -> u64 {
     let usual = USUAL_S * design.sample_rate_hz;
     let settled = design.axes.iter().map(|axis| 2.0 * axis.steady_state.settling_time * design.sample_rate_hz);

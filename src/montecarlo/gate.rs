@@ -1,10 +1,11 @@
 //! The tests of the gate, and how many of them make one verdict.
 //!
-//! Every test gives a *raw* p-value from its own formula. Tests that look at many epochs, lengths or frequencies at once take the least, and
-//! the law of that least value for a true filter, drawn in `super::law`, makes it the p-value of one test: the band is simultaneous. In the same way
-//! the least p-value over all tests and axes is held against its own law (Westfall & Young 1993, single step), so that the family-wise
-//! false-alarm probability *is* alpha, not merely bounded by it as with Holm's or Bonferroni's rule: the tests are correlated, and the
-//! law knows how.
+//! Every test gives a *raw* p-value from its own formula. Tests that look at many epochs, lengths or frequencies at
+//! once take the least, and the law of that least value for a true filter, drawn in `super::law`, makes it the
+//! p-value of one test: the band is simultaneous. In the same way the least p-value over all tests and axes is held
+//! against its own law (Westfall & Young 1993, single step), so that the family-wise false-alarm probability *is*
+//! alpha, not merely bounded by it as with Holm's or Bonferroni's rule: the tests are correlated, and the law knows
+//! how.
 
 use std::fmt;
 
@@ -127,8 +128,8 @@ impl<'a> Raw<'a> {
 
     /// Independent NEES values that the average over the evenly spread epochs of one run is worth: E² r / Σ_jk |ρ_jk|².
     ///
-    /// For one state and ρ_jk = λ^|j−k| this is n(1 − λ²)/(1 + λ²) (formula of Bar-Shalom, Li & Kirubarajan 2001, section 5.4, for a
-    /// Gauss-Markov error): a run of many epochs is worth few independent ones.
+    /// For one state and ρ_jk = λ^|j−k| this is n(1 − λ²)/(1 + λ²) (formula of Bar-Shalom, Li & Kirubarajan 2001,
+    /// section 5.4, for a Gauss-Markov error): a run of many epochs is worth few independent ones.
     pub fn effective(&self) -> f64 {
         self.over_time.sum.powi(2) / (self.over_time.squares * self.size())
     }
@@ -213,8 +214,8 @@ pub fn periodogram_distance(ordinates: &[f64]) -> (f64, usize) {
     (distance, at)
 }
 
-/// Law of the NEES summed over the evenly spread epochs of a run of a true filter: its weights are the eigenvalues of the correlation
-/// matrix of the whitened errors of all these epochs, blocks ρ_jk = E(u_j u_kᵀ).
+/// Law of the NEES summed over the evenly spread epochs of a run of a true filter: its weights are the eigenvalues
+/// of the correlation matrix of the whitened errors of all these epochs, blocks ρ_jk = E(u_j u_kᵀ).
 pub(super) fn nees_over_time(axis: &AxisCourse) -> &QuadraticForm {
     axis.over_time.get_or_init(|| law_over_time(axis))
 }
@@ -251,8 +252,8 @@ fn of_all(size: usize, below: &[Vec<DMatrix<f64>>]) -> Vec<f64> {
     symmetric_eigenvalues(&correlation)
 }
 
-/// The same of many states, most of which are forgotten between two epochs: what no other epoch knows more than [`UNKNOWN`] of, as correlation, has a weight of
-/// one, and the eigenvalues are those of the rest.
+/// The same of many states, most of which are forgotten between two epochs: what no other epoch knows more than
+/// [`UNKNOWN`] of, as correlation, has a weight of one, and the eigenvalues are those of the rest.
 fn of_what_is_known(size: usize, below: &[Vec<DMatrix<f64>>]) -> Vec<f64> {
     let count = below.len();
     // of all that epoch k shares with others, Σ_j ρ_jkᵀ ρ_jk
@@ -296,8 +297,9 @@ fn of_what_is_known(size: usize, below: &[Vec<DMatrix<f64>>]) -> Vec<f64> {
 
 /// Law of a least p-value, from drawn ones.
 ///
-/// P(p_min ≤ t) is the share of drawn values up to t. Where fewer than 50 were drawn, it goes on as the power of t that leads from the
-/// five-hundredth to the fiftieth: one for exact p-values, less where the raw p-value makes a tail too light.
+/// P(p_min ≤ t) is the share of drawn values up to t. Where fewer than 50 were drawn, it goes on as the power of t
+/// that leads from the five-hundredth to the fiftieth: one for exact p-values, less where the raw p-value makes a
+/// tail too light.
 #[derive(Clone, Debug)]
 pub struct LeastLaw {
     drawn: Vec<f64>,
@@ -416,8 +418,9 @@ impl Gate {
 mod tests {
     use super::*;
 
-    /// Nine states of which two, mixed with the others, are remembered (0.9 and 0.5 from one of six epochs to the next) and one a little (0.01): the weights are those of the whole matrix, to
-    /// 1e-9, at least 36 of the 54 being one, and those of epochs that know nothing of each other are all one.
+    /// Nine states of which two, mixed with the others, are remembered (0.9 and 0.5 from one of six epochs to the
+    /// next) and one a little (0.01): the weights are those of the whole matrix, to 1e-9, at least 36 of the 54
+    /// being one, and those of epochs that know nothing of each other are all one.
     #[test]
     fn weights_of_what_is_known_are_those_of_all() {
         let (size, count) = (9, 6);

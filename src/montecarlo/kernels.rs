@@ -1,7 +1,7 @@
 //! The inner loops of the [`engine`](super::engine), compiled for each instruction set and chosen at run time.
 //!
-//! Every lane goes through the same operations in the same order whatever the width of the instructions, so the bits are the same too; a
-//! product and a sum are never fused. A lane of eight numbers is `pieces` registers.
+//! Every lane goes through the same operations in the same order whatever the width of the instructions, so the bits
+//! are the same too; a product and a sum are never fused. A lane of eight numbers is `pieces` registers.
 
 use pulp::{Simd, WithSimd};
 
@@ -73,8 +73,8 @@ impl WithSimd for Stretch<'_, '_, '_> {
 }
 
 impl Stretch<'_, '_, '_> {
-    /// The same as [`in_memory`](Stretch::in_memory) for a filter and a truth of `N` states with one measurement at every step. `APART`: no
-    /// state drives another.
+    /// The same as [`in_memory`](Stretch::in_memory) for a filter and a truth of `N` states with one measurement at
+    /// every step. `APART`: no state drives another.
     #[inline(always)]
     fn in_registers<S: Simd, const N: usize, const APART: bool>(self, simd: S) {
         let Stretch { axis, runs, scratch, observer: _, step: first, stop } = self;
@@ -381,8 +381,8 @@ fn add_up<S: Simd>(simd: S, numbers: &[Lane], sum: &mut Lane) {
     }
 }
 
-/// Adds Σ y_k y_(k−h) of the fresh numbers, those after the first `lags`, to the products of lags 1, 2, … Lags are taken some at a time, so
-/// that as many sums are under way at once.
+/// Adds Σ y_k y_(k−h) of the fresh numbers, those after the first `lags`, to the products of lags 1, 2, … Lags are
+/// taken some at a time, so that as many sums are under way at once.
 #[inline(always)]
 fn lag_products<S: Simd>(simd: S, y: &[Lane], lags: usize, products: &mut [Lane]) {
     let (some, rest) = products.as_chunks_mut::<5>();

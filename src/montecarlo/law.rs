@@ -1,13 +1,14 @@
 //! The law of the gate's statistics for a true filter, by drawing them without simulating the runs.
 //!
-//! For a true filter the errors at the epochs are a Gauss-Markov chain, e' = Φ e + c with c ~ N(0, P' − Φ P Φᵀ), and the innovations are
-//! independent N(0, 1). What the gate looks at are sums over M runs, so only E Eᵀ and E 1 of the n × M matrix E of errors matter. Runs can
-//! be rotated without changing the law: the first column is then the mean (times √M), the rest a triangular factor of a Wishart matrix, and a
-//! step of the chain needs about n² random numbers whatever M is. Of many states only what two epochs have in common is followed. One replicate
-//! of a gate of 1000 runs of 60 000 steps costs microseconds.
-//! Exact for NEES, mean errors and block powers; of relative order 1/(number of updates) for autocorrelations. Left out are the dependence
-//! between errors and innovations and that between periodogram and block powers; both make the gate milder than alpha, if anything, and
-//! whole experiments have not told the difference (docs/validation.md).
+//! For a true filter the errors at the epochs are a Gauss-Markov chain, e' = Φ e + c with c ~ N(0, P' − Φ P Φᵀ), and
+//! the innovations are independent N(0, 1). What the gate looks at are sums over M runs, so only E Eᵀ and E 1 of the
+//! n × M matrix E of errors matter. Runs can be rotated without changing the law: the first column is then the mean
+//! (times √M), the rest a triangular factor of a Wishart matrix, and a step of the chain needs about n² random
+//! numbers whatever M is. Of many states only what two epochs have in common is followed. One replicate of a gate of
+//! 1000 runs of 60 000 steps costs microseconds. Exact for NEES, mean errors and block powers; of relative order
+//! 1/(number of updates) for autocorrelations. Left out are the dependence between errors and innovations and that
+//! between periodogram and block powers; both make the gate milder than alpha, if anything, and whole experiments
+//! have not told the difference (docs/validation.md).
 //!
 //! Sources: Anderson 2003, section 7.2 (Bartlett's decomposition); Bar-Shalom, Li & Kirubarajan 2001, section 5.4.
 
@@ -61,8 +62,9 @@ const SMALL: usize = 6;
 /// What an epoch tells the next one less than this about (correlation of whitened errors) is not followed.
 const NEGLIGIBLE: f64 = 1e-4;
 
-/// Coordinates in which the errors of each epoch are followed: the states scaled to their largest claimed sigma, or, where there are many (lines
-/// of vibration have two each, and forget between two epochs), those whitened errors that the next or the last epoch knows something of.
+/// Coordinates in which the errors of each epoch are followed: the states scaled to their largest claimed sigma, or,
+/// where there are many (lines of vibration have two each, and forget between two epochs), those whitened errors
+/// that the next or the last epoch knows something of.
 fn coordinates(axis: &AxisCourse) -> Vec<Coordinates> {
     let (n, epochs) = (axis.gains.states, &axis.gains.epochs);
     if n <= SMALL {
@@ -342,8 +344,9 @@ mod tests {
     use crate::params::Params;
     use crate::tune::{TuneOptions, tune};
 
-    /// Three lines beside a drift: eight states, of which the lines forget within the 1 s between two epochs: what is followed are two directions back and two forth at most. The time average of
-    /// the NEES keeps its exact mean r and variance 2 Σ w²/(E² M), the mean error its mean r: within 5 standard errors of 4000 draws (6e-7 each).
+    /// Three lines beside a drift: eight states, of which the lines forget within the 1 s between two epochs: what
+    /// is followed are two directions back and two forth at most. The time average of the NEES keeps its exact mean
+    /// r and variance 2 Σ w²/(E² M), the mean error its mean r: within 5 standard errors of 4000 draws (6e-7 each).
     #[test]
     fn errors_that_are_soon_forgotten_count_without_being_followed() {
         let text = r#"{"format": "kfdesign-params/1", "quantity": "angular-rate", "sample_rate": "100 Hz", "axes": [{"name": "x",

@@ -1,11 +1,12 @@
 //! Many simulated runs through a design: does its covariance tell the truth? (floor 5)
 //!
-//! An [`Experiment`] is design, truth, length, seed and level. Its [`Course`] holds what no random number changes (gains, epochs, block lengths);
-//! the engine adds up what the gate looks at over any range of runs, exactly; `conclusion` makes tests of the sums; `gate` and
-//! `law` know how these tests behave together for a true filter, so that the verdict has the false-alarm probability it states.
+//! An [`Experiment`] is design, truth, length, seed and level. Its [`Course`] holds what no random number changes
+//! (gains, epochs, block lengths); the engine adds up what the gate looks at over any range of runs, exactly;
+//! `conclusion` makes tests of the sums; `gate` and `law` know how these tests behave together for a true filter, so
+//! that the verdict has the false-alarm probability it states.
 //!
-//! The truth is a linear model: x(0) ~ N(x0, P0), exact process and measurement noise. Every random number is addressed by (seed, run, axis,
-//! source).
+//! The truth is a linear model: x(0) ~ N(x0, P0), exact process and measurement noise. Every random number is
+//! addressed by (seed, run, axis, source).
 
 pub mod calibration;
 mod conclusion;
@@ -96,8 +97,8 @@ pub fn verify(design: &FilterDesign, plan: &Plan) -> Result<Outcome, MonteCarloE
     verify_against(design, design, plan)
 }
 
-/// The same with another truth: `truth` must have the axes and sample rate of `design`; with other states than the filter's, the error
-/// that is judged is that of the whole drift.
+/// The same with another truth: `truth` must have the axes and sample rate of `design`; with other states than the
+/// filter's, the error that is judged is that of the whole drift.
 pub fn verify_against(design: &FilterDesign, truth: &FilterDesign, plan: &Plan) -> Result<Outcome, MonteCarloError> {
     experiment::check(plan.steps, plan.alpha)?;
     if plan.runs < 2 {

@@ -31,8 +31,8 @@ pub struct Outcome {
     pub steps: u64,
     pub duration_s: f64,
     pub seed: u64,
-    /// A test fails when its p-value is at or below this; set so that a true filter fails some test with probability alpha.
-    /// Null in a document of interrupted work.
+    /// A test fails when its p-value is at or below this; set so that a true filter fails some test with probability
+    /// alpha. Null in a document of interrupted work.
     #[schemars(with = "Option<f64>")]
     pub critical_p_value: f64,
     /// Measured; absent where it was not asked for.
@@ -48,7 +48,8 @@ pub struct Outcome {
     pub axes: Vec<AxisOutcome>,
 }
 
-/// Curves of one axis. Errors are those of all states, or of the whole drift where filter and truth have different states.
+/// Curves of one axis. Errors are those of all states, or of the whole drift where filter and truth have different
+/// states.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct AxisOutcome {
     pub name: String,

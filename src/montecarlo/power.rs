@@ -1,9 +1,10 @@
 //! What the gate would see: the power of its tests against a wrong parameter, from the exact covariance analysis.
 //!
-//! The filter under test is held fixed and the truth is moved: "factor 2" means that the filter's value is twice the true one. Means and
-//! variances of the statistics are exact ([`crate::filter::mismatch::expect`]) but for two approximations: the variance of sums over time takes
-//! the correlation that the statistics have for a true filter, and sums of squares have the scaled χ² law of their first two moments. The probability that the
-//! gate rejects is at least that of its most powerful test, which is what is given.
+//! The filter under test is held fixed and the truth is moved: "factor 2" means that the filter's value is twice the
+//! true one. Means and variances of the statistics are exact ([`crate::filter::mismatch::expect`]) but for two
+//! approximations: the variance of sums over time takes the correlation that the statistics have for a true filter,
+//! and sums of squares have the scaled χ² law of their first two moments. The probability that the gate rejects is
+//! at least that of its most powerful test, which is what is given.
 
 use rayon::prelude::*;
 
@@ -242,7 +243,8 @@ impl<'a> Instrument<'a> {
     }
 }
 
-/// Probability that a sum with this mean and variance leaves the two-sided χ²(`freedom`) bounds of level `p`; scaled χ².
+/// Probability that a sum with this mean and variance leaves the two-sided χ²(`freedom`) bounds of level `p`; scaled
+/// χ².
 fn outside(p: f64, freedom: f64, mean: f64, variance: f64) -> f64 {
     beyond([0.5 * p, 1.0 - 0.5 * p].map(|p| chi_square_quantile(p, freedom)), mean, variance)
 }
@@ -305,7 +307,8 @@ pub fn rejection(course: &Course, gate: &Gate, runs: u64) -> Option<Rejection> {
     (0..course.axes.len()).map(of_axis).max_by(|a, b| a.probability.total_cmp(&b.probability))
 }
 
-/// Simulates the found sizes of axis `number` with `experiments` whole experiments each and counts what the gate catches.
+/// Simulates the found sizes of axis `number` with `experiments` whole experiments each and counts what the gate
+/// catches.
 pub fn confirm(
     experiment: &Experiment,
     own: &Course,

@@ -28,8 +28,8 @@ impl Spread {
         Ok(Spread { axis, design: FilterDesign { axes: Vec::new(), ..design.clone() } })
     }
 
-    /// The truth of a run: every parameter with an interval is log-normal with the value as its median and the interval as its 95 %
-    /// range. Parameters outside what a model can be built from give the nominal one.
+    /// The truth of a run: every parameter with an interval is log-normal with the value as its median and the
+    /// interval as its 95 % range. Parameters outside what a model can be built from give the nominal one.
     pub(super) fn draw(&self, seed: u64, run: u64, number: u32, nominal: &LinearModel) -> LinearModel {
         let mut axis = self.axis.clone();
         for (term, (_, parameter)) in (PARAMETERS..).zip(axis.noise_parameters()) {

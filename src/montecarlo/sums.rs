@@ -17,9 +17,10 @@ pub(super) const NIS_BINS: usize = 40;
 
 /// Where each sum of an axis stands in the lists of numbers of a run.
 ///
-/// Values: per epoch log₁₀ NEES, u (r numbers), u uᵀ (lower triangle by rows) with u the whitened error of r components; then per
-/// measurement Σy, Σy², Σ y_k y_(k−h) for every lag, Σ (block sum)²/length for every block length, the periodogram's ordinates.
-/// Counts: per epoch and component how often |e| was within 1, 2, 3 sigma; then per measurement the NIS histogram.
+/// Values: per epoch log₁₀ NEES, u (r numbers), u uᵀ (lower triangle by rows) with u the whitened error of r
+/// components; then per measurement Σy, Σy², Σ y_k y_(k−h) for every lag, Σ (block sum)²/length for every block
+/// length, the periodogram's ordinates. Counts: per epoch and component how often |e| was within 1, 2, 3 sigma; then
+/// per measurement the NIS histogram.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
     components: usize,

@@ -2,10 +2,10 @@
 //! standard deviation B (Kasdin 1995). Its spectrum is B²dt/(2|sin πf dt|), which tends to B²/(2π|f|).
 //! Other names: bias instability, 1/f noise, pink noise. The floor of the Allan deviation is B √(2 ln2/π) = 0.6643 B.
 //!
-//! The variance does not exist, that of differences does: the generalised covariance of the samples is −(B²/π) ψ(|l| + ½).
-//! Since ψ(l + ½) − ψ(½) = ∫₀^∞ (1 − e^{−lx})/(2 sinh(x/2)) dx, the process is exactly a mixture of Gauss–Markov processes with
-//! φ = e^{−x} and variance density B²/(2π sinh(x/2)). The trapezoidal rule in ln x makes of it a chain of few states whose
-//! error is known: the filter's realisation and the sample path are such chains.
+//! The variance does not exist, that of differences does: the generalised covariance of the samples is −(B²/π) ψ(|l| +
+//! ½). Since ψ(l + ½) − ψ(½) = ∫₀^∞ (1 − e^{−lx})/(2 sinh(x/2)) dx, the process is exactly a mixture of
+//! Gauss–Markov processes with φ = e^{−x} and variance density B²/(2π sinh(x/2)). The trapezoidal rule in ln x makes
+//! of it a chain of few states whose error is known: the filter's realisation and the sample path are such chains.
 
 use std::f64::consts::PI;
 
@@ -42,7 +42,8 @@ pub(super) fn second_difference(coefficient: f64, m1: u64, m2: u64, h: i64, dt: 
 fn term(lag: i128, m: u64, c: f64) -> f64 {
     match side(lag, m) {
         Side::Clear(distance) if distance >= ASYMPTOTIC => {
-            // (4l² − 1)(ψ(l + ½) − c) = (4l² − 1)(ln l − c) + 1/6 + tail(l): the second differences of l² ln l and ln l in closed form
+            // (4l² − 1)(ψ(l + ½) − c) = (4l² − 1)(ln l − c) + 1/6 + tail(l): the second differences of l² ln l and
+            // ln l in closed form
             let (m, x) = (m as f64, distance as f64 + m as f64);
             let r = m / x;
             let logarithm = (-r * r).ln_1p();
@@ -92,9 +93,9 @@ fn digamma_half(l: u128) -> f64 {
     psi
 }
 
-/// Nodes x = dt/Tc (fast to slow) with their variances for B = 1: trapezoidal rule in ln x from `fast` to a time constant of
-/// twice the horizon, at least `per_decade` of them. The two end variances, which also stand for what lies beyond the ends,
-/// are set so that the Allan variance is exact at m = 1 and at the horizon.
+/// Nodes x = dt/Tc (fast to slow) with their variances for B = 1: trapezoidal rule in ln x from `fast` to a time
+/// constant of twice the horizon, at least `per_decade` of them. The two end variances, which also stand for what
+/// lies beyond the ends, are set so that the Allan variance is exact at m = 1 and at the horizon.
 fn chain(fast: f64, per_decade: f64, horizon: u64) -> Vec<(f64, f64)> {
     let range = (fast * 2.0 * horizon as f64).ln();
     let steps = (range * per_decade / std::f64::consts::LN_10).ceil().max(1.0);

@@ -72,10 +72,10 @@ pub(super) fn second_differences(
 
 /// Second differences of θ for σ = dt = 1.
 ///
-/// Generalised covariance of θ: −(a φ^|l| + b |l|), a = φ/(1−φ)², b = (1+φ)/(2(1−φ)). For l on one side of zero the second
-/// difference of φ^|l| over a window is a product and that of |l| vanishes; only windows that straddle zero need the terms
-/// themselves. As long as the longer window is short against Tc, the common value a (m1 x)² is taken out of each term:
-/// it vanishes in the second difference over the other window, and what is left does not cancel.
+/// Generalised covariance of θ: −(a φ^|l| + b |l|), a = φ/(1−φ)², b = (1+φ)/(2(1−φ)). For l on one side of zero the
+/// second difference of φ^|l| over a window is a product and that of |l| vanishes; only windows that straddle zero
+/// need the terms themselves. As long as the longer window is short against Tc, the common value a (m1 x)² is taken
+/// out of each term: it vanishes in the second difference over the other window, and what is left does not cancel.
 struct Lags {
     x: f64,
     m1: u64,

@@ -20,8 +20,9 @@ impl Grid {
         Grid { frequency_hz, dt, sin, cos, weights: vec![], every: 1 }
     }
 
-    /// Of a series made of samples `dt` s apart: of `every` of them the mean (`averaged`) or the first. All that the slower series cannot tell
-    /// apart adds: with k = `every`, S(f) = Σ_{l<k} S₁(f_l) w_l, f_l = f + l/(k dt); w_l = [sin(π k f_l dt)/(k sin(π f_l dt))]² for means, else 1.
+    /// Of a series made of samples `dt` s apart: of `every` of them the mean (`averaged`) or the first. All that the
+    /// slower series cannot tell apart adds: with k = `every`, S(f) = Σ_{l<k} S₁(f_l) w_l, f_l = f + l/(k dt); w_l =
+    /// [sin(π k f_l dt)/(k sin(π f_l dt))]² for means, else 1.
     ///
     /// `frequency_hz`: above 0, at most 1/(2 k dt).
     pub fn thinned(frequency_hz: &[f64], dt: f64, every: usize, averaged: bool) -> Grid {
@@ -40,7 +41,8 @@ impl Grid {
         Grid { weights, every, ..Grid::new(all, dt) }
     }
 
-    /// Of a band limit made of area ratios: ∂ ln S by the logarithm of each, at every frequency, and ∂ ln b₀² by it; `None` where frequencies add.
+    /// Of a band limit made of area ratios: ∂ ln S by the logarithm of each, at every frequency, and ∂ ln b₀² by it;
+    /// `None` where frequencies add.
     pub(crate) fn shape_slopes(&self, ratios: &[f64]) -> Option<Vec<(Vec<f64>, f64)>> {
         self.weights.is_empty().then(|| Filter::slopes(ratios, &self.sin, &self.cos))
     }

@@ -1,4 +1,5 @@
-//! The kinds of noise, each described once: its names, its parameters with their dimensions, and what it is to a filter.
+//! The kinds of noise, each described once: its names, its parameters with their dimensions, and what it is to a
+//! filter.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -116,7 +117,8 @@ impl Kind {
         self.description().half_seconds
     }
 
-    /// Drift of the bias, which a filter estimates and takes off; else noise of the measurement, whatever states it needs.
+    /// Drift of the bias, which a filter estimates and takes off; else noise of the measurement, whatever states it
+    /// needs.
     pub fn is_drift(self) -> bool {
         self.description().is_drift
     }

@@ -1,8 +1,9 @@
-//! Noise processes: spectrum, Allan variance (sampled form), autocovariance, state-space realisation, exact sample path (floor 1).
+//! Noise processes: spectrum, Allan variance (sampled form), autocovariance, state-space realisation, exact sample
+//! path (floor 1).
 //!
-//! One file per process. Every coefficient is SI: with u the unit of the quantity (rad/s or m/s²),
-//! `density` u/√Hz, `std_dev` u, `frequency_hz` Hz, `correlation_time` s, rate-random-walk `density` u/√s, `coefficient` of flicker u,
-//! of quantisation u·s, `slope` u/s.
+//! One file per process. Every coefficient is SI: with u the unit of the quantity (rad/s or m/s²), `density` u/√Hz,
+//! `std_dev` u, `frequency_hz` Hz, `correlation_time` s, rate-random-walk `density` u/√s, `coefficient` of flicker
+//! u, of quantisation u·s, `slope` u/s.
 
 mod band_limit;
 mod bias_instability;
@@ -141,8 +142,8 @@ impl Term {
         }
     }
 
-    /// Allan variance of the sampled process at averaging factor m ≥ 1 (tau = m dt), unit².
-    /// For all terms but the ramp it equals 4 ∫₀^{1/2dt} S(f) sin⁴(πfm dt)/(m² sin²(πf dt)) df with S from [`Term::psd`].
+    /// Allan variance of the sampled process at averaging factor m ≥ 1 (tau = m dt), unit². For all terms but the
+    /// ramp it equals 4 ∫₀^{1/2dt} S(f) sin⁴(πfm dt)/(m² sin²(πf dt)) df with S from [`Term::psd`].
     pub fn allan_variance(&self, m: u64, dt: f64) -> f64 {
         match *self {
             Term::Quantization { coefficient } => quantization::allan_variance(coefficient, m, dt),
@@ -178,10 +179,10 @@ impl Term {
         }
     }
 
-    /// r_h = cov(z_k, z_{k+h}), z_k = θ_{k+2m} − 2θ_{k+m} + θ_k with θ the running sum of samples times dt: what the exact
-    /// degrees of freedom need. r_0 = 2 m² dt² · allan_variance(m), except for the ramp: it has no covariance (0), z_k is the
-    /// constant slope · m² dt². Error below 1e-10 r_0 for all m, h below 10¹²,
-    /// of an oscillation with whole turns in m relative to its other r_0.
+    /// r_h = cov(z_k, z_{k+h}), z_k = θ_{k+2m} − 2θ_{k+m} + θ_k with θ the running sum of samples times dt: what the
+    /// exact degrees of freedom need. r_0 = 2 m² dt² · allan_variance(m), except for the ramp: it has no covariance
+    /// (0), z_k is the constant slope · m² dt². Error below 1e-10 r_0 for all m, h below 10¹², of an oscillation
+    /// with whole turns in m relative to its other r_0.
     pub fn second_difference_autocovariance(&self, m: u64, h: u64, dt: f64) -> f64 {
         self.second_difference_cross_covariance(m, m, h.min(i64::MAX as u64) as i64, dt)
     }
@@ -262,8 +263,8 @@ impl Term {
 }
 
 impl NoiseModel {
-    /// Every line is below half the sample rate 1/dt. The sampled forms hold above it too, but a document with a line up there is
-    /// most likely in error.
+    /// Every line is below half the sample rate 1/dt. The sampled forms hold above it too, but a document with a
+    /// line up there is most likely in error.
     pub fn check_rate(&self, dt: f64) -> Result<(), TooFast> {
         let fast = self.terms.iter().find_map(|term| match *term {
             Term::Oscillation { frequency_hz, .. } if frequency_hz * dt >= 0.5 => Some(frequency_hz),
@@ -271,8 +272,8 @@ impl NoiseModel {
         });
         fast.map_or(Ok(()), |frequency_hz| Err(TooFast { frequency_hz, dt }))
     }
-    /// The terms that count samples, "moving_average over 2 samples and quantization": at another sample rate each is another process, and all others are the
-    /// same. None if there is none.
+    /// The terms that count samples, "moving_average over 2 samples and quantization": at another sample rate each
+    /// is another process, and all others are the same. None if there is none.
     pub fn of_samples(&self) -> Option<String> {
         let counted: Vec<String> = self
             .terms

@@ -1,6 +1,6 @@
-//! Moving average: white noise that the sensor's own averaging (anti-alias filter) has correlated over neighbouring samples,
-//! w_k = (1/q) Σ_{i<q} n_{k−i} with independent n of variance N²/dt, q from 2. At low frequencies it is white noise of density N.
-//! Other names: MA(q − 1), boxcar, sinc filter, band limit.
+//! Moving average: white noise that the sensor's own averaging (anti-alias filter) has correlated over neighbouring
+//! samples, w_k = (1/q) Σ_{i<q} n_{k−i} with independent n of variance N²/dt, q from 2. At low frequencies it is
+//! white noise of density N. Other names: MA(q − 1), boxcar, sinc filter, band limit.
 
 use nalgebra::{DMatrix, RowDVector};
 use rand::rngs::ChaCha8Rng;
@@ -27,8 +27,9 @@ pub(super) fn allan_variance(density: f64, samples: u32, m: u64, dt: f64) -> f64
     second_difference(density, samples, m, m, 0, dt) / (2.0 * (m as f64 * dt).powi(2))
 }
 
-/// Generalised covariance of θ: −(N² dt/2q²) Σ_{|d|<q} (q − |d|) |l + d|. The triangle is the second difference over q of
-/// (|l|³ − |l|)/6, so that −(N² dt/12q²) [u(l + q) − 2u(l) + u(l − q)], u = |l|³ − |l|, exact in integers and O(1).
+/// Generalised covariance of θ: −(N² dt/2q²) Σ_{|d|<q} (q − |d|) |l + d|. The triangle is the second difference over
+/// q of (|l|³ − |l|)/6, so that −(N² dt/12q²) [u(l + q) − 2u(l) + u(l − q)], u = |l|³ − |l|, exact in integers and
+/// O(1).
 pub(super) fn second_difference(density: f64, samples: u32, m1: u64, m2: u64, h: i64, dt: f64) -> f64 {
     let q = i128::from(samples);
     let cube = |l: i128| {

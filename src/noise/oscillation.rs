@@ -1,9 +1,10 @@
 //! Oscillation, a vibration line: second-order Gauss–Markov process with the autocovariance σ² e^{−|τ|/Tc} cos(2πf₀τ).
 //! Source: Maybeck 1979, Stochastic Models, Estimation and Control, vol. 1, section 4.11 (with phase zero).
 //!
-//! It is the real part of a complex Gauss–Markov process y_{k+1} = φ y_k + …, φ = e^{−z}, z = dt/Tc − i2πf₀dt, so that every form
-//! is that of a Gauss–Markov process at a complex argument. The phase of φ^l is reduced exactly, so that no lag is too long.
-//! A line above half the sample rate is sampled as its alias; [`super::NoiseModel::check_rate`] refuses it all the same.
+//! It is the real part of a complex Gauss–Markov process y_{k+1} = φ y_k + …, φ = e^{−z}, z = dt/Tc − i2πf₀dt, so
+//! that every form is that of a Gauss–Markov process at a complex argument. The phase of φ^l is reduced exactly, so
+//! that no lag is too long. A line above half the sample rate is sampled as its alias;
+//! [`super::NoiseModel::check_rate`] refuses it all the same.
 
 use std::f64::consts::TAU;
 
@@ -82,11 +83,13 @@ impl Rotation {
 
 /// Second differences of θ for σ = dt = 1: those of the Gauss–Markov process at complex argument, real part.
 ///
-/// Generalised covariance of θ: −Re(a φ^|l| + b |l|), a = φ/(1−φ)², b = (1+φ)/(2(1−φ)). As long as the longer window is short,
+/// Generalised covariance of θ: −Re(a φ^|l| + b |l|), a = φ/(1−φ)², b = (1+φ)/(2(1−φ)). As long as the longer window
+/// is short,
 /// |m2 z| ≤ 1, the common value a (m1 z)² is taken out of each term, as for the real process.
 ///
-/// Error below 3e-14 of √(r_0(m1) r_0(m2)) + |a| (min(1, |m1 z|) min(1, |m2 z|))², the variances and what a pure line shows: only for
-/// a nearly pure line with whole turns in m, where its variance vanishes, is the latter the larger.
+/// Error below 3e-14 of √(r_0(m1) r_0(m2)) + |a| (min(1, |m1 z|) min(1, |m2 z|))², the variances and what a pure
+/// line shows: only for a nearly pure line with whole turns in m, where its variance vanishes, is the latter the
+/// larger.
 struct Lags {
     rotation: Rotation,
     m1: u64,

@@ -1,8 +1,9 @@
-//! Quantisation of the integrated angle (or velocity): y_k = (e_k − e_{k−1})/dt with independent e of standard deviation Q.
+//! Quantisation of the integrated angle (or velocity): y_k = (e_k − e_{k−1})/dt with independent e of standard
+//! deviation Q.
 //!
-//! A quantiser of step D rounds with Q = D/√12. The errors are taken as Gaussian, so that the model is exact for a linear
-//! filter and its likelihood; a real quantiser's uniform errors have the same covariances. Rounding the *rate* samples
-//! themselves is another thing: it adds white noise of variance D²/12 per sample.
+//! A quantiser of step D rounds with Q = D/√12. The errors are taken as Gaussian, so that the model is exact for a
+//! linear filter and its likelihood; a real quantiser's uniform errors have the same covariances. Rounding the
+//! *rate* samples themselves is another thing: it adds white noise of variance D²/12 per sample.
 
 use nalgebra::{dmatrix, dvector};
 use rand::rngs::ChaCha8Rng;

@@ -7,9 +7,10 @@ use super::{NoiseModel, Term};
 impl Term {
     /// Variance of the mean of `samples` consecutive samples, unit², T their span.
     ///
-    /// N²/T for wideband noise; 2σ²Tc/T·(1 − (Tc/T)(1 − e^(−T/Tc))) for Gauss-Markov, of an oscillation the real part at 1/Tc − i2πf₀ in
-    /// place of 1/Tc; 2(Q/T)² for quantisation, the error of an integral over its length. A random walk, flicker or ramp has no mean; for
-    /// these it is the variance of the difference between this mean and that of an equally long next log, twice their Allan variance at T.
+    /// N²/T for wideband noise; 2σ²Tc/T·(1 − (Tc/T)(1 − e^(−T/Tc))) for Gauss-Markov, of an oscillation the real
+    /// part at 1/Tc − i2πf₀ in place of 1/Tc; 2(Q/T)² for quantisation, the error of an integral over its length. A
+    /// random walk, flicker or ramp has no mean; for these it is the variance of the difference between this mean
+    /// and that of an equally long next log, twice their Allan variance at T.
     pub fn mean_variance(&self, samples: u64, dt: f64) -> f64 {
         let span = samples as f64 * dt;
         match *self {

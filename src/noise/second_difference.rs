@@ -1,7 +1,7 @@
 //! Second differences of the integrated process, from which Allan estimates are made.
 //!
-//! θ_k is the running sum of samples times dt and z_k = θ_{k+2m} − 2θ_{k+m} + θ_k. For a process whose increments of θ are
-//! stationary there is a generalised covariance G, known up to an even polynomial of degree 2, with
+//! θ_k is the running sum of samples times dt and z_k = θ_{k+2m} − 2θ_{k+m} + θ_k. For a process whose increments of
+//! θ are stationary there is a generalised covariance G, known up to an even polynomial of degree 2, with
 //! cov(z⁽¹⁾_k, z⁽²⁾_{k+h}) = Σ_i Σ_j d_i d_j G(h + j m2 − i m1), d = (1, −2, 1).
 
 /// (1, −2, 1).

@@ -1,8 +1,9 @@
 //! Chi-square, normal and Kolmogorov probabilities and quantiles.
 //! All take fractional degrees of freedom where that makes sense and are total: bad arguments give NaN, never a panic.
 //!
-//! Incomplete gamma functions and starting quantiles come from `statrs`; where its rounding grows with the degrees of
-//! freedom (above `LARGE_DOF`) Temme's uniform expansion replaces it. Checked against mpmath to 1e-9 relative in both tails.
+//! Incomplete gamma functions and starting quantiles come from `statrs`; where its rounding grows with the degrees
+//! of freedom (above `LARGE_DOF`) Temme's uniform expansion replaces it. Checked against mpmath to 1e-9 relative in
+//! both tails.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
 use statrs::function::gamma::{checked_gamma_lr, checked_gamma_ur};
@@ -16,8 +17,8 @@ pub const NORMAL_99: f64 = 2.575_829_303_548_900_4;
 /// Median of χ²₁.
 pub const CHI_SQUARE_1_MEDIAN: f64 = 0.454_936_423_119_572_8;
 
-/// Above this many degrees of freedom Temme's expansion is used: its neglected term is below 5e-10 of the tail there, and
-/// the rounding of x^a e^{-x}/Γ(a) in `statrs` is not yet above 1e-10.
+/// Above this many degrees of freedom Temme's expansion is used: its neglected term is below 5e-10 of the tail
+/// there, and the rounding of x^a e^{-x}/Γ(a) in `statrs` is not yet above 1e-10.
 const LARGE_DOF: f64 = 2e5;
 
 /// P(χ²_dof ≤ x).
@@ -47,8 +48,8 @@ fn chi_square_tail(x: f64, dof: f64, upper: bool) -> f64 {
     if upper { checked_gamma_ur(a, half) } else { checked_gamma_lr(a, half) }.unwrap_or(f64::NAN)
 }
 
-/// Regularised incomplete gamma functions Q(a, x) (`upper`) and P(a, x) for large a.
-/// Source: Temme 1979; DLMF 8.12.8, first term: the second is below 5e-10 of either tail down to probabilities of 1e-12.
+/// Regularised incomplete gamma functions Q(a, x) (`upper`) and P(a, x) for large a. Source: Temme 1979; DLMF
+/// 8.12.8, first term: the second is below 5e-10 of either tail down to probabilities of 1e-12.
 fn temme(a: f64, x: f64, upper: bool) -> f64 {
     const C: [f64; 5] = [-1.0 / 3.0, 1.0 / 12.0, -2.0 / 135.0, 1.0 / 864.0, 1.0 / 2835.0];
     let mu = (x - a) / a;

@@ -2,9 +2,9 @@
 
 /// The exact sum of any number of doubles, as a list of doubles that do not overlap.
 ///
-/// Adding, and merging two sums, loses nothing, so any grouping gives the same number. Infinite or NaN terms make the sum so, and for good;
-/// so does a sum that leaves the range of doubles on its way.
-/// Source: Shewchuk 1997, Discrete Comput. Geom. 18, section 2 (grow-expansion).
+/// Adding, and merging two sums, loses nothing, so any grouping gives the same number. Infinite or NaN terms make
+/// the sum so, and for good; so does a sum that leaves the range of doubles on its way. Source: Shewchuk 1997,
+/// Discrete Comput. Geom. 18, section 2 (grow-expansion).
 #[derive(Clone, Debug, Default)]
 pub struct ExactSum {
     /// Increasing magnitude, no zero; their sum is the sum.
@@ -26,7 +26,8 @@ impl ExactSum {
             let (large, small) = ordered(carry, self.partials[i]);
             let sum = large + small;
             if !sum.is_finite() {
-                // what overflowed stays so: its rest would be no number, and each further term would add one more to the list
+                // what overflowed stays so: its rest would be no number, and each further term would add one more to
+                // the list
                 self.unbounded += sum;
                 self.partials.clear();
                 return;
@@ -80,7 +81,8 @@ impl ExactSum {
         sum
     }
 
-    /// The one list of doubles v₀, v₁, … with v₀ the rounded sum, v₁ the rounded rest, and so on, that adds up to the sum exactly.
+    /// The one list of doubles v₀, v₁, … with v₀ the rounded sum, v₁ the rounded rest, and so on, that adds up to
+    /// the sum exactly.
     ///
     /// Empty for zero; one entry that is not finite when a term was not.
     pub fn digits(&self) -> Vec<f64> {

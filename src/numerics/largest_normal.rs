@@ -14,9 +14,10 @@ const SEED: u64 = 1;
 
 /// max_i |Z_i| of Z ~ N(0, C), C a correlation matrix.
 ///
-/// P(max |Z| > z) = K p E[1/#{i: |Z_i| > z}], p = P(|Z_1| > z), where one Z_j, j uniform of K, is drawn from its tail and the others given
-/// it: unbiased, and of bounded relative error however small the probability. The draws have a fixed seed, so that the same C gives the
-/// same numbers. Source: Adler, Blanchet & Liu 2012, Ann. Appl. Probab. 22 (section 3).
+/// P(max |Z| > z) = K p E[1/#{i: |Z_i| > z}], p = P(|Z_1| > z), where one Z_j, j uniform of K, is drawn from its
+/// tail and the others given it: unbiased, and of bounded relative error however small the probability. The draws
+/// have a fixed seed, so that the same C gives the same numbers. Source: Adler, Blanchet & Liu 2012, Ann. Appl.
+/// Probab. 22 (section 3).
 #[derive(Clone, Debug)]
 pub struct LargestNormal {
     correlation: DMatrix<f64>,
@@ -81,7 +82,8 @@ impl LargestNormal {
 mod tests {
     use super::*;
 
-    /// Independent: 1 − (1 − 2(1 − Φ(z)))^K; all equal: 2(1 − Φ(z)). The draws' own error is 1 % of what is not one value alone.
+    /// Independent: 1 − (1 − 2(1 − Φ(z)))^K; all equal: 2(1 − Φ(z)). The draws' own error is 1 % of what is not one
+    /// value alone.
     #[test]
     fn closed_forms_at_both_ends() {
         for count in [1, 2, 7, 30] {

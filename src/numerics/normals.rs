@@ -1,13 +1,14 @@
 //! Normal numbers for several runs side by side: one instruction draws for all of them.
 //!
-//! Every run has its own generator, so that its numbers do not depend on which runs are beside it. Nothing but +, −, ×, ÷, √ and bit
-//! operations is used, each rounded as IEEE 754 says, so that any processor gives the same bits.
+//! Every run has its own generator, so that its numbers do not depend on which runs are beside it. Nothing but +, −,
+//! ×, ÷, √ and bit operations is used, each rounded as IEEE 754 says, so that any processor gives the same bits.
 
 use rand::Rng;
 
 use super::random::{StreamId, stream};
 
-/// Generators of `L` runs, xoshiro256++ (Blackman and Vigna 2021), each started from 256 bits of the ChaCha8 stream of its address.
+/// Generators of `L` runs, xoshiro256++ (Blackman and Vigna 2021), each started from 256 bits of the ChaCha8 stream
+/// of its address.
 #[derive(Clone, Debug)]
 pub struct Normals<const L: usize> {
     state: [[u64; L]; 4],
@@ -20,9 +21,11 @@ impl<const L: usize> Normals<L> {
         Normals { state: std::array::from_fn(|_| std::array::from_fn(|l| streams[l].next_u64())) }
     }
 
-    /// Standard normal numbers: `out[k][l]` is the k-th of run l. `words` is scratch of the same length, which must be even.
+    /// Standard normal numbers: `out[k][l]` is the k-th of run l. `words` is scratch of the same length, which must
+    /// be even.
     ///
-    /// Polar coordinates, √(−2 ln u) cos θ and √(−2 ln u) sin θ (Box and Muller 1958): the first half of the words gives u, the second θ.
+    /// Polar coordinates, √(−2 ln u) cos θ and √(−2 ln u) sin θ (Box and Muller 1958): the first half of the words
+    /// gives u, the second θ.
     #[inline(always)]
     pub fn fill(&mut self, words: &mut [[u64; L]], out: &mut [[f64; L]]) {
         self.words(words);
@@ -100,7 +103,8 @@ fn ln(u: f64) -> f64 {
     e * std::f64::consts::LN_2 + (2.0 * s + s * z * p)
 }
 
-/// sin y and cos y, |y| ≤ π/4. Coefficients: FDLIBM `k_sin.c` and `k_cos.c` (Sun Microsystems 1993), errors below 2^−58.
+/// sin y and cos y, |y| ≤ π/4. Coefficients: FDLIBM `k_sin.c` and `k_cos.c` (Sun Microsystems 1993), errors below
+/// 2^−58.
 #[inline(always)]
 fn sin_cos(y: f64) -> (f64, f64) {
     const S: [f64; 6] = [
@@ -192,8 +196,8 @@ mod tests {
         }
     }
 
-    /// Moments to the fourth and the correlations of neighbours, of runs and of a pair: each within 5 sigma of its own scatter, 8 figures,
-    /// false alarms 5e-6 in all (fixed seed).
+    /// Moments to the fourth and the correlations of neighbours, of runs and of a pair: each within 5 sigma of its
+    /// own scatter, 8 figures, false alarms 5e-6 in all (fixed seed).
     #[test]
     fn numbers_are_standard_normal() {
         let mut normals = normals();

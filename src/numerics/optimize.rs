@@ -110,8 +110,8 @@ pub fn lowest(mut f: impl FnMut(f64) -> f64, mut low: f64, mut high: f64, width:
     0.5 * (low + high)
 }
 
-/// What is known at a point: the objective, then the constraints, and the slopes of each by every x; none where they were
-/// not asked for.
+/// What is known at a point: the objective, then the constraints, and the slopes of each by every x; none where they
+/// were not asked for.
 #[derive(Clone, Debug, Default)]
 pub struct Look {
     pub values: Vec<f64>,

@@ -1,9 +1,9 @@
 //! Who waits for long work: hears how far it is, and may ask it to stop.
 //!
-//! [`watched`] runs the work on threads that know who waits, so that nothing has to be handed through the calls between.
-//! Loops that may take long call [`checkpoint`] every few milliseconds at most; a stop unwinds the work from there,
-//! without a message, to [`watched`]. What was held is released on the way: unfinished files vanish. Work that nobody
-//! watches is never stopped.
+//! [`watched`] runs the work on threads that know who waits, so that nothing has to be handed through the calls
+//! between. Loops that may take long call [`checkpoint`] every few milliseconds at most; a stop unwinds the work
+//! from there, without a message, to [`watched`]. What was held is released on the way: unfinished files vanish.
+//! Work that nobody watches is never stopped.
 //!
 //! A stop is no panic of the program: it is the way out that rayon's threads carry to their caller.
 

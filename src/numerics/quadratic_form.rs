@@ -1,7 +1,7 @@
 //! Law of a sum of weighted chi-square values: quadratic forms of normal vectors.
 
-/// Least and largest |2 t λ_max| of the saddlepoints that are tabulated, and the ratio of neighbours: a straight line between them is
-/// within 1e-3 of z wherever |z| < 9.
+/// Least and largest |2 t λ_max| of the saddlepoints that are tabulated, and the ratio of neighbours: a straight
+/// line between them is within 1e-3 of z wherever |z| < 9.
 const LEAST: f64 = 1e-6;
 const RATIO: f64 = 1.05;
 const MOST_BELOW: f64 = 1e6;
@@ -10,9 +10,9 @@ const MOST_ABOVE: f64 = 1.0 - 1e-6;
 
 /// X = Σ_i w_i χ²_k, all χ² independent and of the same k degrees of freedom.
 ///
-/// Saddlepoint approximation: with K(t) = −½ Σ ln(1 − 2 t w_i) and K'(t) = x/k, z = √k r + ln(q/r)/(√k r) is standard normal, where
-/// r = sign(t) √(2(t K'(t) − K(t))), q = t √K''(t). Right to a few per cent of either tail for one degree of freedom, to 1/k of that for
-/// k of them. Source: Barndorff-Nielsen 1990; Kuonen 1999.
+/// Saddlepoint approximation: with K(t) = −½ Σ ln(1 − 2 t w_i) and K'(t) = x/k, z = √k r + ln(q/r)/(√k r) is
+/// standard normal, where r = sign(t) √(2(t K'(t) − K(t))), q = t √K''(t). Right to a few per cent of either tail
+/// for one degree of freedom, to 1/k of that for k of them. Source: Barndorff-Nielsen 1990; Kuonen 1999.
 #[derive(Clone, Debug, PartialEq)]
 pub struct QuadraticForm {
     /// Σ w and Σ w².

@@ -15,8 +15,9 @@ pub struct StreamId {
 
 /// An independent ChaCha8 stream for this address. Same address, same numbers, on any thread.
 ///
-/// The 256-bit key is the address itself (`"kfdesign"`, seed, run, axis, term; little-endian), so two addresses never share a
-/// key, and streams of different keys are unrelated by the construction of the cipher (Bernstein 2008).
+/// The 256-bit key is the address itself (`"kfdesign"`, seed, run, axis, term; little-endian), so two addresses
+/// never share a key, and streams of different keys are unrelated by the construction of the cipher (Bernstein
+/// 2008).
 pub fn stream(seed: u64, id: StreamId) -> ChaCha8Rng {
     let mut key = [0; 32];
     key[..8].copy_from_slice(b"kfdesign");

@@ -86,7 +86,8 @@ pub fn by_eight(x: &[f64], term: impl Fn(f64) -> f64) -> f64 {
 
 /// Compensated mean of a slice; NaN if it is empty.
 ///
-/// Eight sums side by side, each addition with its rounding (Knuth 1998, section 4.2.2), so that no sample waits for the one before.
+/// Eight sums side by side, each addition with its rounding (Knuth 1998, section 4.2.2), so that no sample waits for
+/// the one before.
 pub fn mean(x: &[f64]) -> f64 {
     const SIDE_BY_SIDE: usize = 8;
     let (mut sums, mut lost) = ([0.0; SIDE_BY_SIDE], [0.0; SIDE_BY_SIDE]);

@@ -19,13 +19,13 @@ pub struct RiccatiSolution {
     pub iterations: usize,
 }
 
-/// Structured doubling for P = F P Fᵀ − F P Hᵀ (H P Hᵀ + R)⁻¹ H P Fᵀ + Q. F n×n, H m×n, Q n×n (semidefinite), R m×m (definite).
+/// Structured doubling for P = F P Fᵀ − F P Hᵀ (H P Hᵀ + R)⁻¹ H P Fᵀ + Q. F n×n, H m×n, Q n×n (semidefinite), R m×m
+/// (definite).
 ///
-/// Needs (F, H) detectable and no undriven mode on or outside the unit circle; then step k equals 2^k steps of the filter.
-/// One Newton step follows.
-/// Errors: shapes, R not definite, or no convergence (the closed loop does not decay).
-/// Source: Chu, Fan, Lin, Wang 2004, "Structure-preserving algorithms for periodic discrete-time algebraic Riccati
-/// equations", Int. J. Control 77 (SDA).
+/// Needs (F, H) detectable and no undriven mode on or outside the unit circle; then step k equals 2^k steps of the
+/// filter. One Newton step follows. Errors: shapes, R not definite, or no convergence (the closed loop does not
+/// decay). Source: Chu, Fan, Lin, Wang 2004, "Structure-preserving algorithms for periodic discrete-time algebraic
+/// Riccati equations", Int. J. Control 77 (SDA).
 pub fn dare_doubling(
     f: &DMatrix<f64>,
     h: &DMatrix<f64>,
@@ -38,8 +38,8 @@ pub fn dare_doubling(
     Ok(RiccatiSolution { covariance, relative_residual, iterations })
 }
 
-/// The Riccati recursion over some steps, P → X + Aᵀ P (I + G P)⁻¹ A: A is the transposed closed-loop transition from P = 0,
-/// X the covariance reached from P = 0, G the information gathered about the start.
+/// The Riccati recursion over some steps, P → X + Aᵀ P (I + G P)⁻¹ A: A is the transposed closed-loop transition
+/// from P = 0, X the covariance reached from P = 0, G the information gathered about the start.
 #[derive(Clone, Debug)]
 pub struct Flow {
     a: DMatrix<f64>,
@@ -113,8 +113,8 @@ impl Flow {
         Err(LinalgError::NoConvergence { iterations: MAX_DOUBLINGS, residual: change })
     }
 
-    /// The covariance P(k|k−1) that repeats after these steps: periodic Riccati equation P = X + Aᵀ P (I + G P)⁻¹ A, by doubling and one
-    /// Newton step. Conditions and errors as of [`dare_doubling`].
+    /// The covariance P(k|k−1) that repeats after these steps: periodic Riccati equation P = X + Aᵀ P (I + G P)⁻¹ A,
+    /// by doubling and one Newton step. Conditions and errors as of [`dare_doubling`].
     pub fn periodic(&self) -> Result<RiccatiSolution, LinalgError> {
         let n = self.a.nrows();
         let (p, iterations) = self.clone().settled()?;
@@ -140,8 +140,8 @@ impl Flow {
         Ok(solve(w, &self.a)?.transpose())
     }
 
-    /// The same by eigenvectors, see [`dare_eigenvector`]. States that forget everything within the steps make eigenvalues of zero that
-    /// cannot be told apart: the residual says so.
+    /// The same by eigenvectors, see [`dare_eigenvector`]. States that forget everything within the steps make
+    /// eigenvalues of zero that cannot be told apart: the residual says so.
     pub fn periodic_eigenvector(&self) -> Result<RiccatiSolution, LinalgError> {
         let covariance = eigenvector_solution(&self.a.transpose(), &self.g, &self.x)?;
         let relative_residual = self.residual(&covariance)?;
@@ -226,7 +226,8 @@ fn eigenvector_solution(f: &DMatrix<f64>, g: &DMatrix<f64>, q: &DMatrix<f64>) ->
     Ok(covariance)
 }
 
-/// Discrete Lyapunov equation X = A X Aᵀ + Q by doubling (A stable, Q symmetric semidefinite): a sum of semidefinite terms.
+/// Discrete Lyapunov equation X = A X Aᵀ + Q by doubling (A stable, Q symmetric semidefinite): a sum of semidefinite
+/// terms.
 ///
 /// Errors: shapes, or no convergence (A has a pole on or outside the unit circle).
 /// Source: Smith 1968, SIAM J. Applied Mathematics 16 (squared form).

@@ -4,7 +4,8 @@ use nalgebra::DMatrix;
 
 use super::linalg::{LinalgError, require_shape, symmetrise};
 
-/// Transition F = exp(A dt) and noise Qd = ∫₀^dt exp(A s) Qc exp(Aᵀ s) ds. A and Qc n × n, Qc symmetric (two-sided density).
+/// Transition F = exp(A dt) and noise Qd = ∫₀^dt exp(A s) Qc exp(Aᵀ s) ds. A and Qc n × n, Qc symmetric (two-sided
+/// density).
 ///
 /// One matrix exponential over a step short enough that ‖A‖ step ≤ 1, then doubling Qd ← Qd + F Qd Fᵀ, F ← F²: a sum of
 /// semidefinite terms, so nothing cancels when dt is long. Errors: shapes, or entries that are not finite.

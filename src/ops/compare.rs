@@ -30,7 +30,8 @@ pub struct Request {
     #[arg(long, default_value_t = 0.01, value_name = "P", allow_negative_numbers = true)]
     #[serde(default = "alpha")]
     pub alpha: f64,
-    /// Identify the log too, and put every number of the file beside the log's own: its interval, the ratio, and whether it lies inside
+    /// Identify the log too, and put every number of the file beside the log's own: its interval, the ratio, and
+    /// whether it lies inside
     #[arg(long)]
     #[serde(default)]
     pub parameters: bool,
@@ -87,7 +88,8 @@ pub(super) fn read(params: &Path, log: &Path, reading: &Reading) -> anyhow::Resu
     Ok(Pair { params, log, left_out, check, sha256: recording.sha256, unit })
 }
 
-/// Axes that are alike but cannot be told apart in the log (a file has one number for three of them): one stands for every axis of the log.
+/// Axes that are alike but cannot be told apart in the log (a file has one number for three of them): one stands for
+/// every axis of the log.
 fn one_for_all(params: &mut Params, log: &[LogAxis]) {
     let wanted: Vec<&str> = params.axes.iter().map(|axis| axis.name.as_str()).collect();
     let found: Vec<&str> = log.iter().map(|axis| axis.name.as_str()).collect();

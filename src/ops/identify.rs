@@ -34,15 +34,17 @@ use crate::units::{Quantity, amount, digits};
 #[derive(Clone, Debug, clap::Args, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Request {
-    /// The log, sensor at rest, of any format that `kfdesign info` reads; several logs of the same sensor, one per start, also give its turn-on bias
+    /// The log, sensor at rest, of any format that `kfdesign info` reads; several logs of the same sensor, one per
+    /// start, also give its turn-on bias
     #[arg(required = true, value_name = "LOG")]
     pub logs: Vec<PathBuf>,
     /// How parameters are taken from the log
     #[arg(long, value_enum, default_value_t = MethodArg::Likelihood)]
     #[serde(default)]
     pub method: MethodArg,
-    /// Terms of the model: auto, or white+gm, white+rrw … (terms: white, gm (up to three), rrw, flicker, quantization, ramp; for likelihood
-    /// also osc, ma (ma2 … ma64: an average over so many samples) and, in the place of white, bl (bl1 … bl6: a band limit of so many poles))
+    /// Terms of the model: auto, or white+gm, white+rrw … (terms: white, gm (up to three), rrw, flicker,
+    /// quantization, ramp; for likelihood also osc, ma (ma2 … ma64: an average over so many samples) and, in the
+    /// place of white, bl (bl1 … bl6: a band limit of so many poles))
     #[arg(long, value_name = "MODEL", default_value = "auto")]
     #[serde(default = "auto")]
     pub model: String,
@@ -56,13 +58,15 @@ pub struct Request {
     #[arg(long, value_name = "DURATION", allow_hyphen_values = true)]
     #[serde(default)]
     pub window: Option<String>,
-    /// Leave outliers out: samples farther from their surroundings than normal noise goes. Where the rest has tails, those of Student's t, N holds their variance;
-    /// where it has none, N is that of the noise without the outliers. Without this flag N holds the variance of all samples
+    /// Leave outliers out: samples farther from their surroundings than normal noise goes. Where the rest has tails,
+    /// those of Student's t, N holds their variance; where it has none, N is that of the noise without the outliers.
+    /// Without this flag N holds the variance of all samples
     #[arg(long)]
     #[serde(default)]
     pub robust: bool,
-    /// Temperature column, beside whose regression the parameters are shown: name or 1-based number, with the unit if the header does not say it
-    /// (temp:degC); `none` reads none [default: found by name]. The parameters written are those without
+    /// Temperature column, beside whose regression the parameters are shown: name or 1-based number, with the unit
+    /// if the header does not say it (temp:degC); `none` reads none [default: found by name]. The parameters written
+    /// are those without
     #[arg(long, value_name = "COLUMN")]
     #[serde(default)]
     pub temperature: Option<String>,
@@ -124,7 +128,8 @@ fn is_zero(count: &usize) -> bool {
 #[derive(Debug, Serialize, JsonSchema)]
 struct AxisDocument<'a> {
     name: &'a str,
-    /// Samples from which the parameters are; usable ones of the longest log that had no part in the choice of the terms; samples that were missing and filled in for that.
+    /// Samples from which the parameters are; usable ones of the longest log that had no part in the choice of the
+    /// terms; samples that were missing and filled in for that.
     samples: usize,
     left_out: usize,
     #[serde(skip_serializing_if = "is_zero")]
@@ -149,7 +154,8 @@ struct AxisDocument<'a> {
     /// Likelihood only, where the log has a temperature.
     #[serde(skip_serializing_if = "Option::is_none")]
     temperature: Option<TemperatureDocument<'a>>,
-    /// Excess kurtosis of the whitened log, which the intervals of the coefficients know; with --robust the law of the noise, where it has tails.
+    /// Excess kurtosis of the whitened log, which the intervals of the coefficients know; with --robust the law of
+    /// the noise, where it has tails.
     tails: Tails,
     /// Of several logs: whether each parameter is the same in all.
     #[serde(skip_serializing_if = "<[Between]>::is_empty")]

@@ -21,7 +21,8 @@ pub struct Request {
     /// Noise parameters: guesses of the right size, from a short log or a datasheet
     pub params: PathBuf,
     #[allow(rustdoc::broken_intra_doc_links, reason = "it is the help of a flag, too")]
-    /// As in the document: white.density, gauss_markov[1].std_dev, …; also gauss_markov.driving_noise (sigma sqrt(2/Tc))
+    /// As in the document: white.density, gauss_markov[1].std_dev, …; also gauss_markov.driving_noise (sigma
+    /// sqrt(2/Tc))
     #[arg(long, value_name = "NAME")]
     pub parameter: String,
     /// Relative standard deviation, 1 sigma: 10% or 0.1

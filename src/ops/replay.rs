@@ -50,8 +50,8 @@ pub struct Request {
     #[arg(long, value_name = "SIGMAS", allow_negative_numbers = true)]
     #[serde(default)]
     pub gate: Option<f64>,
-    /// Samples further out than this many sigmas count as outliers: they move the estimate as far as one at that distance would, and are
-    /// not judged (Masreliez and Martin 1977)
+    /// Samples further out than this many sigmas count as outliers: they move the estimate as far as one at that
+    /// distance would, and are not judged (Masreliez and Martin 1977)
     #[arg(long, value_name = "SIGMAS", conflicts_with_all = ["gate", "smooth"], allow_negative_numbers = true)]
     #[serde(default)]
     pub robust: Option<f64>,
@@ -59,14 +59,15 @@ pub struct Request {
     #[arg(long, value_enum, default_value_t = FormFlag::Joseph, conflicts_with = "smooth")]
     #[serde(default)]
     pub form: FormFlag,
-    /// Find the wideband noise (white, moving average, band limit, quantization, lines, Gauss-Markov processes of a few samples) anew as the log goes on,
-    /// from its last samples: 1000s, 20min. Until there are as many the design stands for the rest, so no longer than the log it was identified from;
-    /// only for a sensor at rest
+    /// Find the wideband noise (white, moving average, band limit, quantization, lines, Gauss-Markov processes of a
+    /// few samples) anew as the log goes on, from its last samples: 1000s, 20min. Until there are as many the design
+    /// stands for the rest, so no longer than the log it was identified from; only for a sensor at rest
     #[arg(long, value_name = "DURATION", conflicts_with = "smooth", allow_hyphen_values = true)]
     #[serde(default)]
     pub follow: Option<String>,
-    /// Column of an aid of the filter (or of a known input of a custom plant), one per axis: NAME=COLUMN[,COLUMN…], with the unit if the header does not say it: heading=yaw:deg.
-    /// A row without a number is one without that measurement
+    /// Column of an aid of the filter (or of a known input of a custom plant), one per axis: NAME=COLUMN[,COLUMN…],
+    /// with the unit if the header does not say it: heading=yaw:deg. A row without a number is one without that
+    /// measurement
     #[arg(long, value_name = "NAME=COLUMN")]
     #[serde(default)]
     pub aid: Vec<String>,

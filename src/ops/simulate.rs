@@ -44,7 +44,8 @@ pub struct Request {
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     #[serde(default)]
     pub rate: Option<f64>,
-    /// rest, constant:1deg/s, sine:10deg/s,0.5Hz or file:RATE.csv (one row per sample, one column for all axes or one for each)
+    /// rest, constant:1deg/s, sine:10deg/s,0.5Hz or file:RATE.csv (one row per sample, one column for all axes or
+    /// one for each)
     #[arg(long, value_name = "MOTION", default_value = "rest")]
     #[serde(default = "rest")]
     pub true_rate: String,
@@ -245,7 +246,8 @@ fn true_rate(text: &str, params: &Params, rate_hz: f64) -> anyhow::Result<TrueRa
     }
 }
 
-/// The unit the parameters speak: the white density without its root, or that of a drift or bias, whichever comes first; else SI.
+/// The unit the parameters speak: the white density without its root, or that of a drift or bias, whichever comes
+/// first; else SI.
 fn display_unit(params: &Params) -> anyhow::Result<Unit> {
     let dimension = params.quantity.dimension();
     let spoken = params.axes.iter().flat_map(|axis| {

@@ -30,7 +30,8 @@ pub(crate) struct Stretch {
     pub(crate) outliers: Vec<usize>,
     /// Where the stretch is in the log, or in its pieces laid out with their holes.
     range: Range<usize>,
-    /// The whole log: how many samples are missing before, then samples, of which some may not be finite; empty where `rate` is all.
+    /// The whole log: how many samples are missing before, then samples, of which some may not be finite; empty
+    /// where `rate` is all.
     whole: Vec<(u64, Vec<f64>)>,
 }
 
@@ -50,7 +51,8 @@ impl Stretch {
         self.phase = None;
     }
 
-    /// Outliers count as missing; how many there are in all. Methods that cannot do without a sample get the median of its surroundings.
+    /// Outliers count as missing; how many there are in all. Methods that cannot do without a sample get the median
+    /// of its surroundings.
     pub(crate) fn drop_outliers(&mut self) -> usize {
         if self.whole.is_empty() {
             self.whole = vec![(0, self.rate.clone())];
@@ -68,7 +70,8 @@ impl Stretch {
         count
     }
 
-    /// To hold a noise model against, with short holes filled in at rest: what a motion did in a hole is not known. And what is left out of curves and spectra, in words.
+    /// To hold a noise model against, with short holes filled in at rest: what a motion did in a hole is not known.
+    /// And what is left out of curves and spectra, in words.
     pub(crate) fn into_log_axis(mut self, at_rest: bool) -> (LogAxis, Option<String>) {
         if at_rest {
             self.bridge();
@@ -92,7 +95,8 @@ impl Stretch {
         (left_out + self.filled > 0).then(note)
     }
 
-    /// What stands beside the samples of the axis in the log: beside the stretch, and piece by piece as [`Stretch::pieces`].
+    /// What stands beside the samples of the axis in the log: beside the stretch, and piece by piece as
+    /// [`Stretch::pieces`].
     pub(crate) fn beside(&self, values: &[f64], gaps: &[Gap], kind: InputKind) -> (Vec<f64>, Vec<Vec<f64>>) {
         if self.whole.is_empty() || (self.left_out == 0 && self.filled == 0) {
             let own = beside(values.get(self.range.clone()).unwrap_or_default(), kind);
@@ -182,8 +186,8 @@ fn pieces(values: &[f64], gaps: &[Gap], kind: InputKind, of: impl Fn(&[f64]) -> 
     pieces.collect()
 }
 
-/// Pieces one after the other, what is missing between them not a number; a gap that is too long to be filled counts as one that is just that. `None` where that would be more
-/// than is there: bursts, each for itself.
+/// Pieces one after the other, what is missing between them not a number; a gap that is too long to be filled counts
+/// as one that is just that. `None` where that would be more than is there: bursts, each for itself.
 fn laid_out(pieces: &[(u64, Vec<f64>)]) -> Option<Vec<f64>> {
     let samples: usize = pieces.iter().map(|(_, own)| own.len()).sum();
     // of a log that is as much longer as holes make it
@@ -257,7 +261,8 @@ mod tests {
         assert!(all[100..103].iter().all(|v| v.is_nan()) && all[103] == 1.0);
     }
 
-    /// Fifty samples, a gap too long to fill, then two short holes: what is beside the axis is moved as the axis is, and goes straight on over a hole.
+    /// Fifty samples, a gap too long to fill, then two short holes: what is beside the axis is moved as the axis is,
+    /// and goes straight on over a hole.
     #[test]
     fn beside_what_is_filled_in_stands_what_was_there() {
         let mut rate: Vec<f64> = (0..3050_u32).map(|i| f64::from(i.wrapping_mul(2_654_435_761) >> 8)).collect();

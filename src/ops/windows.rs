@@ -74,8 +74,9 @@ impl Windows {
         self.reader.axes().iter().map(|axis| (axis.name.clone(), unit(&axis.unit))).collect()
     }
 
-    /// Hands every window of every axis to `take` as it is complete: rates, increments or (one more of them) angles. Gives the samples of each axis
-    /// that are in no window: windows do not reach over gaps and unusable samples, one begins anew behind them.
+    /// Hands every window of every axis to `take` as it is complete: rates, increments or (one more of them) angles.
+    /// Gives the samples of each axis that are in no window: windows do not reach over gaps and unusable samples,
+    /// one begins anew behind them.
     pub(crate) fn read(
         mut self,
         mut take: impl FnMut(usize, &[f64]) -> anyhow::Result<()>,

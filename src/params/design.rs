@@ -1,6 +1,7 @@
 //! The `design` section: which plant the sensor is part of, and what aids it.
 //!
-//! It stands in params.json and, as it was used, in filter.json. Values keep their units; the matrices of a custom plant are SI.
+//! It stands in params.json and, as it was used, in filter.json. Values keep their units; the matrices of a custom
+//! plant are SI.
 
 mod linear;
 mod written;
@@ -99,7 +100,8 @@ pub struct AidDrift {
     pub correlation_time: Measured,
 }
 
-/// A linear plant by its matrices, SI: ẋ = A x + B u + G w, w white of unit two-sided density, or x⁺ = A x + B u + G w, w ~ N(0, I); y = H x.
+/// A linear plant by its matrices, SI: ẋ = A x + B u + G w, w white of unit two-sided density, or x⁺ = A x + B u + G
+/// w, w ~ N(0, I); y = H x.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CustomEntry {
     pub discrete: bool,
@@ -272,7 +274,8 @@ impl Design {
         }))
     }
 
-    /// Reads a file that holds nothing but the section, or a linear.json, of which `sensor` is the rate that the gyro measures (q, p or r).
+    /// Reads a file that holds nothing but the section, or a linear.json, of which `sensor` is the rate that the
+    /// gyro measures (q, p or r).
     pub fn from_json(text: &str, path: &str, sensor: Option<&str>) -> Result<Design, ParamsError> {
         let value = place::parse(text).map_err(|e| ParamsError::Syntax {
             path: path.into(),

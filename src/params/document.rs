@@ -51,7 +51,8 @@ struct AxisDocument {
     /// Spread of the bias from one power-up to the next.
     #[serde(skip_serializing_if = "Option::is_none")]
     turn_on_bias: Option<StdDev>,
-    /// How the bias followed the temperature of the log. The noise terms are those of the log as it is: this changes none of them.
+    /// How the bias followed the temperature of the log. The noise terms are those of the log as it is: this changes
+    /// none of them.
     #[serde(skip_serializing_if = "Option::is_none")]
     temperature: Option<TemperatureDocument>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -123,7 +124,8 @@ struct MovingAverage {
     samples: u32,
 }
 
-/// White noise of this density at low frequencies behind a filter b/a, as `scipy.signal` and MATLAB write it, at the sample rate of the document.
+/// White noise of this density at low frequencies behind a filter b/a, as `scipy.signal` and MATLAB write it, at the
+/// sample rate of the document.
 #[derive(Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct BandLimit {

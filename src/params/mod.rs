@@ -117,7 +117,8 @@ pub struct Check {
     pub numbers: BTreeMap<String, f64>,
 }
 
-/// A parameter that is not the same in all logs from which the document is: its value and interval are those of the mean over logs.
+/// A parameter that is not the same in all logs from which the document is: its value and interval are those of the
+/// mean over logs.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BetweenLogs {
@@ -152,7 +153,8 @@ pub struct Source {
 }
 
 impl Source {
-    /// The log, or the fit to it, has failed a check: one line that names each with its axes, and the part that is at rest.
+    /// The log, or the fit to it, has failed a check: one line that names each with its axes, and the part that is
+    /// at rest.
     pub fn failed(&self) -> Option<String> {
         let of = |kind: CheckKind, words: &str| {
             let found = self.checks.iter().filter(|check| check.kind == kind);

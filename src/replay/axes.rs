@@ -4,14 +4,15 @@ use super::{LogShape, ReplayError};
 use crate::filter::FilterDesign;
 use crate::units::Quantity;
 
-/// Sample rates may differ by this much, relatively: stamps of a good log are not better, and the filter does not notice.
+/// Sample rates may differ by this much, relatively: stamps of a good log are not better, and the filter does not
+/// notice.
 pub const RATE_TOLERANCE: f64 = 0.005;
 
 /// Checks that the log can go through the design and gives, for each design axis, the index of its log axis.
 ///
-/// The quantity must be the same and the sample rates must agree within 0.5 %. Axes are matched by name (ignoring case); else by
-/// their last letter x, y, z (`gyro_x`, `wx`, `x`); else, when both have the same number of axes and no name tells otherwise, by order.
-/// Log axes that the design does not have are left out.
+/// The quantity must be the same and the sample rates must agree within 0.5 %. Axes are matched by name (ignoring
+/// case); else by their last letter x, y, z (`gyro_x`, `wx`, `x`); else, when both have the same number of axes and
+/// no name tells otherwise, by order. Log axes that the design does not have are left out.
 pub fn assign(design: &FilterDesign, log: &LogShape) -> Result<Vec<usize>, ReplayError> {
     let wanted: Vec<&str> = design.axes.iter().map(|a| a.name.as_str()).collect();
     assign_to(&wanted, design.quantity, design.sample_rate_hz, log)
@@ -39,7 +40,8 @@ pub fn assign_to(
     partners(wanted, &found).ok_or_else(|| ReplayError::Axes { log: found.join(", "), filter: wanted.join(", ") })
 }
 
-/// For each wanted axis the index of its partner among those found; the rule of [`assign`]. None when it cannot be told.
+/// For each wanted axis the index of its partner among those found; the rule of [`assign`]. None when it cannot be
+/// told.
 pub fn partners(wanted: &[&str], found: &[&str]) -> Option<Vec<usize>> {
     let same_name = |a: &str, b: &str| a.trim().eq_ignore_ascii_case(b.trim());
     let same_letter = |a: &str, b: &str| direction(a).is_some() && direction(a) == direction(b);

@@ -81,8 +81,8 @@ pub(super) struct Channel {
     pub(super) nis_histogram: [u64; NIS_BINS],
 }
 
-/// The score test of x0: a second filter, shifted at the start by one standard deviation of P0 in the direction that the first
-/// measurement sees, shows how innovations answer to such a shift; they are projected on that answer.
+/// The score test of x0: a second filter, shifted at the start by one standard deviation of P0 in the direction that
+/// the first measurement sees, shows how innovations answer to such a shift; they are projected on that answer.
 #[derive(Clone, Debug)]
 pub(super) struct StartTest {
     shifted: Option<Kalman>,

@@ -1,4 +1,5 @@
-//! A filter whose wideband noise is found anew as the log goes on: an adaptive filter. What it does at a sample depends on earlier ones alone.
+//! A filter whose wideband noise is found anew as the log goes on: an adaptive filter. What it does at a sample
+//! depends on earlier ones alone.
 
 use std::collections::VecDeque;
 
@@ -78,7 +79,8 @@ impl Following {
         Ok(Following { follower, window, memory, every, left: every, changes: 0, quantity, model, built, places })
     }
 
-    /// The next sample (what the filter expected where there is none that can be used). The model from here on, where it changes.
+    /// The next sample (what the filter expected where there is none that can be used). The model from here on,
+    /// where it changes.
     pub(super) fn take(&mut self, value: f64) -> Option<LinearModel> {
         if self.window.len() == self.memory {
             self.window.pop_front();
@@ -145,7 +147,8 @@ fn build(follower: &Follower, nudged: bool, quantity: Quantity, dt: f64) -> Opti
     sensor_errors(quantity, &noise, Some(InitialBias { mean: 0.0, std_dev: 0.0 }), dt, 1.0).ok()
 }
 
-/// Whether what `moved` has otherwise than `built` is in `model` as in `built`; `places`: of the states of these in `model`.
+/// Whether what `moved` has otherwise than `built` is in `model` as in `built`; `places`: of the states of these in
+/// `model`.
 fn holds(model: &LinearModel, built: &LinearModel, moved: &LinearModel, places: &[Option<usize>]) -> bool {
     let same = |own: f64, built: f64| (own - built).abs() <= SAME * built.abs();
     let pairs = || (0..places.len()).flat_map(|i| (0..places.len()).map(move |k| (i, k)));

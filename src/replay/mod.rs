@@ -1,11 +1,12 @@
 //! A log through a design to a verdict (floor 4).
 //!
 //! [`Replayer`] takes the log block by block and keeps only running sums, so its memory does not grow with the log.
-//! The sensor of a plant is an input or the first measurement; aids are extra columns, and a row without a number is one without that
-//! measurement. Measured angles are taken modulo a turn: the innovation is the nearest one.
-//! Over a gap the filter predicts and nothing else (an input keeps its last value); a sample that is not a number is skipped (prediction only); a sample outside the gate, if there is
-//! one, is counted and does not change the state. The statistics use the normalised innovations of accepted samples; see
-//! [`verdict`] for what is tested and [`crate::consistency::effect::judge`] for how the verdict on a measured log is reached.
+//! The sensor of a plant is an input or the first measurement; aids are extra columns, and a row without a number is
+//! one without that measurement. Measured angles are taken modulo a turn: the innovation is the nearest one. Over a
+//! gap the filter predicts and nothing else (an input keeps its last value); a sample that is not a number is
+//! skipped (prediction only); a sample outside the gate, if there is one, is counted and does not change the state.
+//! The statistics use the normalised innovations of accepted samples; see [`verdict`] for what is tested and
+//! [`crate::consistency::effect::judge`] for how the verdict on a measured log is reached.
 
 pub mod attitude;
 pub mod axes;
@@ -47,8 +48,8 @@ pub struct Options {
     /// Such a sample still moves the estimate, as far as one at the gate would.
     pub clip: bool,
     pub form: Form,
-    /// The wideband noise is that of the last samples, so many seconds of them; before there are as many, the design stands for the rest. Only for sensors
-    /// at rest and [`Form::Joseph`].
+    /// The wideband noise is that of the last samples, so many seconds of them; before there are as many, the design
+    /// stands for the rest. Only for sensors at rest and [`Form::Joseph`].
     pub follow: Option<f64>,
 }
 
@@ -94,8 +95,8 @@ pub struct Aid {
     pub measurement: Named,
 }
 
-/// What a log must have beside the sensor, axis by axis: an input that is not the sensor, then the measurements that are not. Errors: a custom
-/// plant with several inputs, or one whose design is not told.
+/// What a log must have beside the sensor, axis by axis: an input that is not the sensor, then the measurements that
+/// are not. Errors: a custom plant with several inputs, or one whose design is not told.
 pub fn aids(design: &FilterDesign) -> Result<Vec<Aid>, ReplayError> {
     let mut all = Vec::new();
     for axis in &design.axes {
@@ -284,8 +285,8 @@ pub struct AxisResult {
     pub rejected: u64,
     /// Σ −½(ln 2πS + ν²/S) over every accepted sample.
     pub log_likelihood: f64,
-    /// The whole drift at the end of the log: what the filter expects a sensor at rest to show, but for noise of the measurement. Of a
-    /// plant, its first state.
+    /// The whole drift at the end of the log: what the filter expects a sensor at rest to show, but for noise of the
+    /// measurement. Of a plant, its first state.
     pub final_output: FinalState,
     pub final_state: Vec<FinalState>,
     /// Absent when too few samples were accepted.
@@ -350,7 +351,8 @@ pub struct Replayer {
 }
 
 impl Replayer {
-    /// Checks quantity, rate and axes (see [`axes::assign`]) and that every aid has a column, and starts every filter at x0, P0.
+    /// Checks quantity, rate and axes (see [`axes::assign`]) and that every aid has a column, and starts every
+    /// filter at x0, P0.
     pub fn new(design: &FilterDesign, log: &LogShape, options: Options) -> Result<Replayer, ReplayError> {
         options.check()?;
         let needed = aids(design)?;
@@ -418,7 +420,8 @@ impl Replayer {
         }
     }
 
-    /// From here on every row is kept, for [`smoothed`](Replayer::smoothed): 40 bytes per row and axis, and 16 per measurement.
+    /// From here on every row is kept, for [`smoothed`](Replayer::smoothed): 40 bytes per row and axis, and 16 per
+    /// measurement.
     pub fn remember(&mut self) {
         self.axes.iter_mut().for_each(|axis| axis.history = Some(History::default()));
     }

@@ -1,10 +1,10 @@
 //! From the running sums to tests, effects and the verdict.
 //!
-//! Per axis: `start` (does the log begin where x0 and P0 say?), `nis` (mean size of the innovations), `whiteness` (largest
-//! autocorrelation of lags 1–50), `ljung_box` (all these lags together), `low_frequency` (innovations averaged over a quarter to
-//! sixteen times the filter's time constant; see [`crate::consistency::low_frequency`]), `cumulative_periodogram` (shape of their
-//! low-frequency spectrum) and, behind a gate, `rejected`. Holm's adjustment runs over all tests and axes;
-//! [`effect::judge`] states how p-values and effect sizes make the verdict.
+//! Per axis: `start` (does the log begin where x0 and P0 say?), `nis` (mean size of the innovations), `whiteness`
+//! (largest autocorrelation of lags 1–50), `ljung_box` (all these lags together), `low_frequency` (innovations
+//! averaged over a quarter to sixteen times the filter's time constant; see [`crate::consistency::low_frequency`]),
+//! `cumulative_periodogram` (shape of their low-frequency spectrum) and, behind a gate, `rejected`. Holm's
+//! adjustment runs over all tests and axes; [`effect::judge`] states how p-values and effect sizes make the verdict.
 
 use super::axis::{AxisReplay, Channel};
 use super::follow::Following;
@@ -238,8 +238,9 @@ fn final_state(axis: &AxisReplay, design: &AxisDesign) -> Vec<FinalState> {
         .collect()
 }
 
-/// Standard error of the mean of y² from the data's own spread, √(var(y²)·(1 + 2 Σ ρ_h²)/n): the squares of a Gaussian process
-/// have the squared autocorrelation; each r_h² is lowered by 1/n, what it is without any correlation.
+/// Standard error of the mean of y² from the data's own spread, √(var(y²)·(1 + 2 Σ ρ_h²)/n): the squares of a
+/// Gaussian process have the squared autocorrelation; each r_h² is lowered by 1/n, what it is without any
+/// correlation.
 fn nis_error(squares: f64, fourth: f64, whiteness: &Whiteness) -> f64 {
     let n = whiteness.samples as f64;
     let variance = (fourth / n - (squares / n).powi(2)).max(0.0);

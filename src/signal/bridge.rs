@@ -1,9 +1,11 @@
 //! Short holes in a log, filled for methods that need every sample: with what the log does elsewhere.
 //!
-//! A hole gets the straight line between the levels on both sides, plus what the samples of another place of the same log, without a hole, have beside the straight line between
-//! *their* sides. So white noise stays white, drift bends in the hole as it does elsewhere, and the variance is kept but for 2/w of it, w samples making a
-//! level. What the samples beside a hole say of those in it beyond their level (lines, averaged noise) is lost, for the share of the samples that was missing.
-//! Sources: Kreiss & Paparoditis 2003 (residuals of the series itself), Little & Rubin 2002, section 4.3 (hot deck, stochastic regression).
+//! A hole gets the straight line between the levels on both sides, plus what the samples of another place of the
+//! same log, without a hole, have beside the straight line between *their* sides. So white noise stays white, drift
+//! bends in the hole as it does elsewhere, and the variance is kept but for 2/w of it, w samples making a level.
+//! What the samples beside a hole say of those in it beyond their level (lines, averaged noise) is lost, for the
+//! share of the samples that was missing. Sources: Kreiss & Paparoditis 2003 (residuals of the series itself),
+//! Little & Rubin 2002, section 4.3 (hot deck, stochastic regression).
 
 use rand::RngExt;
 
@@ -35,8 +37,8 @@ pub fn longest_hole(samples: usize) -> usize {
     (LONGEST_HOLE * samples as f64) as usize
 }
 
-/// The stretch with the most samples of `x` (uniform; what is not finite is missing) of which at most 5 % have to be filled in, in holes of at most 1 % of `x`; `None` where the
-/// longest stretch without a hole is about as long.
+/// The stretch with the most samples of `x` (uniform; what is not finite is missing) of which at most 5 % have to be
+/// filled in, in holes of at most 1 % of `x`; `None` where the longest stretch without a hole is about as long.
 ///
 /// Same samples, same result: the other places are drawn from a fixed stream.
 pub fn bridge(x: &[f64]) -> Option<Bridged> {
@@ -78,8 +80,9 @@ struct Joined {
 
 /// The neighbouring runs with the most samples between which few enough are to be filled in.
 ///
-/// Runs i to j may be joined when 5 % of what they span is not less than what is missing: when the balance at the end of j is not below that at the start of i. Only starts
-/// whose balance is lower than every one before can be the first (longest interval of non-negative sum).
+/// Runs i to j may be joined when 5 % of what they span is not less than what is missing: when the balance at the
+/// end of j is not below that at the start of i. Only starts whose balance is lower than every one before can be the
+/// first (longest interval of non-negative sum).
 fn joined(runs: &[(usize, usize)]) -> Option<Joined> {
     let (mut seen, mut missing) = (0, 0);
     // samples before the run and with it, and the balances
@@ -138,7 +141,8 @@ fn filled(x: &[f64]) -> Vec<f64> {
     out
 }
 
-/// The straight line from the mean of what is there of `width` samples before `from` to that of as many from `to` on; by number of the sample after `from`.
+/// The straight line from the mean of what is there of `width` samples before `from` to that of as many from `to`
+/// on; by number of the sample after `from`.
 fn line(x: &[f64], from: usize, to: usize, width: usize) -> impl Fn(usize) -> f64 {
     let level = |first: usize, end: usize| {
         let there = (first..end).filter(|i| x[*i].is_finite());
@@ -162,8 +166,9 @@ mod tests {
         x
     }
 
-    /// Two thousand single holes and ten of 300 in white noise of 200,000 samples, on a slope: what is filled in has mean 0 and variance 1 + 2/32 beside the slope, and no
-    /// correlation with its neighbours, each within 4.5 standard deviations (four statements: 3e-5).
+    /// Two thousand single holes and ten of 300 in white noise of 200,000 samples, on a slope: what is filled in has
+    /// mean 0 and variance 1 + 2/32 beside the slope, and no correlation with its neighbours, each within 4.5
+    /// standard deviations (four statements: 3e-5).
     #[test]
     fn filled_samples_are_noise_like_the_others() {
         let clean = noise(200_000, 3);

@@ -1,11 +1,11 @@
-//! The log check: rate and jitter, gaps, repeated or backward stamps, NaN, stuck and saturated values, quantisation step,
-//! motion, outliers; each with count and place. Works in one streaming pass with bounded memory.
+//! The log check: rate and jitter, gaps, repeated or backward stamps, NaN, stuck and saturated values, quantisation
+//! step, motion, outliers; each with count and place. Works in one streaming pass with bounded memory.
 //!
 //! The rules are stated where they are applied: for time in `stamps`, for one axis in `axis`, for whole rows here:
-//! - *Zero row*: every axis exactly 0, more often than independent axes with the zeros of each would make it by chance (less than
-//!   1 in 10⁶).
-//! - *Repeated row*: every axis equal to the row before, by the same rule, in more than 1 % of the rows: the sensor is slower
-//!   than the log.
+//! - *Zero row*: every axis exactly 0, more often than independent axes with the zeros of each would make it by
+//!   chance (less than 1 in 10⁶).
+//! - *Repeated row*: every axis equal to the row before, by the same rule, in more than 1 % of the rows: the sensor
+//!   is slower than the log.
 //!
 //! Nothing is repaired. NaN stays NaN, a gap stays a gap with its number of missing samples, everything else is kept.
 
@@ -28,9 +28,11 @@ use self::together::Together;
 use super::Gap;
 use crate::units::{Quantity, Unit};
 
-/// Hz: no inertial sensor hands out more (32 kHz is the highest output data rate of the ICM-20649 and ICM-42688 families).
+/// Hz: no inertial sensor hands out more (32 kHz is the highest output data rate of the ICM-20649 and ICM-42688
+/// families).
 const FASTEST: f64 = 32_000.0;
-/// Seconds: in which no drift can be seen, and hardly noise; stamps in seconds that are read as milliseconds make a log of minutes so short.
+/// Seconds: in which no drift can be seen, and hardly noise; stamps in seconds that are read as milliseconds make a
+/// log of minutes so short.
 const SHORTEST: f64 = 1.0;
 
 /// How time was established.
@@ -344,7 +346,8 @@ impl Checker {
         if self.axes.len() < 2 {
             return notes; // one axis cannot be told from its own values
         }
-        // rows by chance if the axes are independent: each axis' share is taken from the rows in which some other axis differs
+        // rows by chance if the axes are independent: each axis' share is taken from the rows in which some other
+        // axis differs
         let by_chance = |count: u64, alike: &dyn Fn(&AxisCheck) -> u64, alone: &[u64]| {
             let share = |(axis, alone): (&AxisCheck, &u64)| {
                 (alike(axis) - count) as f64 / (rows - (count + alone) as f64).max(1.0)

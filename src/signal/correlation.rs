@@ -7,7 +7,8 @@ use realfft::RealFftPlanner;
 
 use crate::numerics::reduce::mean;
 
-/// Lags 0 … `max_lag` of the sample autocovariance `c_h = (1/n) Σ_{k=0}^{n−1−h} (x_k − x̄)(x_{k+h} − x̄)`, unit² of `x`.
+/// Lags 0 … `max_lag` of the sample autocovariance `c_h = (1/n) Σ_{k=0}^{n−1−h} (x_k − x̄)(x_{k+h} − x̄)`, unit² of
+/// `x`.
 ///
 /// Lags at or beyond the length are 0; an empty series gives an empty vector; a NaN anywhere gives NaN everywhere.
 pub fn autocovariance(x: &[f64], max_lag: usize) -> Vec<f64> {
@@ -38,7 +39,8 @@ pub fn autocorrelation(x: &[f64], max_lag: usize) -> Vec<f64> {
     r
 }
 
-/// Lags 0 … `max_lag` of the sums Σ_k a_{k+h} b_k, without a mean taken off; 0 where nothing overlaps. `a` and `b` have the same length.
+/// Lags 0 … `max_lag` of the sums Σ_k a_{k+h} b_k, without a mean taken off; 0 where nothing overlaps. `a` and `b`
+/// have the same length.
 pub fn lagged_products(a: &[f64], b: &[f64], max_lag: usize) -> Vec<f64> {
     let lags = max_lag.min(a.len().saturating_sub(1));
     let direct = |h: usize| a.get(h..).unwrap_or_default().iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
@@ -166,7 +168,8 @@ mod tests {
             .collect()
     }
 
-    /// statsmodels 0.15.0: `acovf(w, adjusted=False, fft=False, nlag=4)`, `acf(w, adjusted=False, fft=False, nlags=200)`.
+    /// statsmodels 0.15.0: `acovf(w, adjusted=False, fft=False, nlag=4)`, `acf(w, adjusted=False, fft=False,
+    /// nlags=200)`.
     #[test]
     fn independent_values() {
         let w = walk();

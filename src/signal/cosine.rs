@@ -1,11 +1,12 @@
 //! Discrete cosine transform of a log, on which noise spectra show without leakage.
 //!
-//! c_j = √(2/n) Σ_k x_k cos(π j (k + ½)/n), j = 1 … n − 1 (DCT-II, orthonormal; j = 0, the mean, is left out), at frequency
-//! f_j = j/(2 n dt). The transform reflects the series at its ends, so that a start and an end at different levels are no jump. For white noise
-//! and for a random walk of unknown start the coefficients are exactly independent with variance S(f_j)/dt, S the sampled spectrum:
-//! the vectors are the eigenvectors of the second-difference matrix with free ends. For a Gauss-Markov process this is true but for terms of
-//! relative order Tc/T.
-//! Sources: Ahmed, Natarajan & Rao 1974; Strang 1999 (The discrete cosine transform, section 2); fast algorithm: Makhoul 1980.
+//! c_j = √(2/n) Σ_k x_k cos(π j (k + ½)/n), j = 1 … n − 1 (DCT-II, orthonormal; j = 0, the mean, is left out), at
+//! frequency f_j = j/(2 n dt). The transform reflects the series at its ends, so that a start and an end at
+//! different levels are no jump. For white noise and for a random walk of unknown start the coefficients are exactly
+//! independent with variance S(f_j)/dt, S the sampled spectrum: the vectors are the eigenvectors of the
+//! second-difference matrix with free ends. For a Gauss-Markov process this is true but for terms of relative order
+//! Tc/T. Sources: Ahmed, Natarajan & Rao 1974; Strang 1999 (The discrete cosine transform, section 2); fast
+//! algorithm: Makhoul 1980.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
@@ -86,7 +87,8 @@ fn of_odd(n: usize, entering: impl Fn(usize) -> f64 + Sync) -> Option<Vec<f64>> 
     Some(out)
 }
 
-/// The way back: x_k = √(2/n) Σ_j c_j cos(π j (k + ½)/n), j = 1 … n − 1, the series without its mean. By one plan for many series of n samples.
+/// The way back: x_k = √(2/n) Σ_j c_j cos(π j (k + ½)/n), j = 1 … n − 1, the series without its mean. By one plan
+/// for many series of n samples.
 pub struct Inverse {
     samples: usize,
     plan: std::sync::Arc<dyn realfft::ComplexToReal<f64>>,
@@ -167,7 +169,8 @@ mod tests {
         }
     }
 
-    /// Long series are transformed in parts; by one plan the same: coefficients are of size one, rounding of log n additions.
+    /// Long series are transformed in parts; by one plan the same: coefficients are of size one, rounding of log n
+    /// additions.
     #[test]
     fn parts_are_the_whole() {
         for n in [16_384, 18_000, 2 * 8209, 2 * 9001, 9001, 10_007, 10_125] {

@@ -1,9 +1,10 @@
 //! Discrete Fourier transform of many numbers without large tables, on any number of threads.
 //!
-//! X_k = Σ_j x_j e^{−2πijk/m}. With m = a b, j = b j₁ + j₂ and k = k₁ + a k₂ this is b transforms of length a, factors e^{−2πi j₂k₁/m}, and
-//! a transforms of length b, so that plans are made for lengths near √m alone: a plan for half a million points costs more than two
-//! transforms of them. Where m has no such factors, a convolution on a length that has. Every number is computed in the same way whatever
-//! the threads. Sources: Cooley & Tukey 1965; Bailey 1990 (four steps); Bluestein 1970.
+//! X_k = Σ_j x_j e^{−2πijk/m}. With m = a b, j = b j₁ + j₂ and k = k₁ + a k₂ this is b transforms of length a,
+//! factors e^{−2πi j₂k₁/m}, and a transforms of length b, so that plans are made for lengths near √m alone: a plan
+//! for half a million points costs more than two transforms of them. Where m has no such factors, a convolution on a
+//! length that has. Every number is computed in the same way whatever the threads. Sources: Cooley & Tukey 1965;
+//! Bailey 1990 (four steps); Bluestein 1970.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -205,8 +206,9 @@ mod tests {
         Complex::new((j as f64 * 0.37).sin() + 0.1, (j as f64 * j as f64 * 0.011).cos())
     }
 
-    /// Lengths with factors, with a last tile that is not full, with one large factor, and prime, against a transform of the whole: |x| is about
-    /// one, so numbers grow to some thousand; rounding of log m additions of numbers of size √m, 1e-10 is a hundred times that.
+    /// Lengths with factors, with a last tile that is not full, with one large factor, and prime, against a
+    /// transform of the whole: |x| is about one, so numbers grow to some thousand; rounding of log m additions of
+    /// numbers of size √m, 1e-10 is a hundred times that.
     #[test]
     fn is_the_transform_of_the_whole() {
         for m in [8192, 9000, 64 * 131, 2 * 4099, 8209, 10_007] {
@@ -243,7 +245,8 @@ mod tests {
         assert_eq!(smooth(333_333), 337_500);
     }
 
-    /// Tables against sine and cosine of each: angles below 2π are rounded to 4e-16, on both sides, and once more in a walk.
+    /// Tables against sine and cosine of each: angles below 2π are rounded to 4e-16, on both sides, and once more in
+    /// a walk.
     #[test]
     fn roots_lie_on_the_circle() {
         let m = 1003;

@@ -19,9 +19,10 @@ pub struct Line {
 
 /// Peaks that white noise shaped like the surroundings would show with probability 10⁻³ at most, strongest first.
 ///
-/// `power`: squares of the cosine coefficients 1, 2, …, in any unit; `step`: their distance in Hz, 1/(2 n dt); `dof`: degrees of freedom that each adds to a sum, below 1 where a
-/// taper ties neighbours together. Looked for above number 256.
-/// The level of the surroundings is the median over a band, which a narrow line does not move (the median of χ²₁ is 0.4549).
+/// `power`: squares of the cosine coefficients 1, 2, …, in any unit; `step`: their distance in Hz, 1/(2 n dt);
+/// `dof`: degrees of freedom that each adds to a sum, below 1 where a taper ties neighbours together. Looked for
+/// above number 256. The level of the surroundings is the median over a band, which a narrow line does not move (the
+/// median of χ²₁ is 0.4549).
 pub fn find_lines(power: &[f64], step: f64, dof: f64) -> Vec<Line> {
     // below, drift has its own shapes
     const FIRST: usize = 256;

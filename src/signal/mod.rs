@@ -30,7 +30,8 @@ pub struct Gap {
     pub missing: u64,
 }
 
-/// Uniformly sampled data on several axes. All axes have the same length. NaN marks a sample that is there but unusable.
+/// Uniformly sampled data on several axes. All axes have the same length. NaN marks a sample that is there but
+/// unusable.
 #[derive(Clone, Debug)]
 pub struct Recording {
     /// File name, for provenance.
@@ -42,8 +43,8 @@ pub struct Recording {
     pub axes: Vec<Axis>,
     /// Ascending by index; found from the time column by a stated rule, never repaired.
     pub gaps: Vec<Gap>,
-    /// As long as the axes, if the log has it and it was asked for: readings times the factor of their unit (degC counts from 0 degC), of which only
-    /// differences are used. NaN where it is missing.
+    /// As long as the axes, if the log has it and it was asked for: readings times the factor of their unit (degC
+    /// counts from 0 degC), of which only differences are used. NaN where it is missing.
     pub temperature: Option<Axis>,
     /// Hex SHA-256 of the file's bytes (as stored), if it came from a file.
     pub sha256: Option<String>,

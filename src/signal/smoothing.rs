@@ -2,9 +2,9 @@
 
 use super::Gap;
 
-/// Mean of all finite values within `half` samples on either side, gaps counted with their length. Towards the ends of the log the window shrinks on
-/// both sides, so that a straight line stays what it is. Where a window holds no value: straight between its neighbours, level at the ends.
-/// NaN throughout when no value is finite.
+/// Mean of all finite values within `half` samples on either side, gaps counted with their length. Towards the ends
+/// of the log the window shrinks on both sides, so that a straight line stays what it is. Where a window holds no
+/// value: straight between its neighbours, level at the ends. NaN throughout when no value is finite.
 pub fn moving_average(values: &[f64], gaps: &[Gap], half: usize) -> Vec<f64> {
     let place = places(values.len(), gaps);
     let (first, last) = (place.first().copied().unwrap_or(0), place.last().copied().unwrap_or(0));

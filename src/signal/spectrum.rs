@@ -20,14 +20,16 @@ pub struct Spectrum {
     pub segments: usize,
 }
 
-/// Periodogram of the whole series without its mean: `S(f_k) = (dt/n) |Σ_j (x_j − x̄) e^{−2πijk/n}|²`, `f_k = k/(n dt)`.
+/// Periodogram of the whole series without its mean: `S(f_k) = (dt/n) |Σ_j (x_j − x̄) e^{−2πijk/n}|²`, `f_k = k/(n
+/// dt)`.
 ///
 /// `dt` in s. An empty series gives an empty spectrum. Source: Percival and Walden 1993, eq. 196b.
 pub fn periodogram(x: &[f64], dt: f64) -> Spectrum {
     averaged(x, dt, &vec![1.0; x.len()], 1)
 }
 
-/// Welch's spectrum: the mean of the periodograms of Hann-windowed half-overlapping segments, each without its own mean.
+/// Welch's spectrum: the mean of the periodograms of Hann-windowed half-overlapping segments, each without its own
+/// mean.
 ///
 /// `segment`: samples per segment, at most the length (longer is cut to it). Source: Welch 1967.
 pub fn welch(x: &[f64], dt: f64, segment: usize) -> Spectrum {

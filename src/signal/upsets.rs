@@ -1,4 +1,5 @@
-//! What no stationary noise does: single samples far off, and steps of the level. Medians find them, so that they do not hide themselves.
+//! What no stationary noise does: single samples far off, and steps of the level. Medians find them, so that they do
+//! not hide themselves.
 
 use super::check::robust;
 use crate::numerics::distribution::normal_quantile;
@@ -13,9 +14,11 @@ const REACH: usize = 128;
 /// Longest memory, in samples, and differences of which it is judged.
 const LONGEST_MEMORY: usize = 512;
 const JUDGED: usize = 20_000;
-/// Power of differences over two, four and eight times as many samples as the memory, over that of those over it, at most.
+/// Power of differences over two, four and eight times as many samples as the memory, over that of those over it, at
+/// most.
 const SETTLED: [f64; 3] = [1.25, 1.5, 1.75];
-/// Limits are wider by this for the scatter of level (3 %) and scale (2 %): simulated logs then have outliers as seldom as intended.
+/// Limits are wider by this for the scatter of level (3 %) and scale (2 %): simulated logs then have outliers as
+/// seldom as intended.
 const SCATTER: f64 = 1.07;
 /// Scale of a normal law in median absolute deviations.
 const MAD: f64 = 1.482_602_218_505_602;
@@ -34,14 +37,16 @@ pub struct Step {
     pub sigmas: f64,
 }
 
-/// Indices of samples that are farther from the median of their surroundings than normal noise of the same robust scale would put any of
-/// them with a probability of 10⁻³ (per log; Bonferroni). A sample that is not finite is none. Source: Hampel 1974.
+/// Indices of samples that are farther from the median of their surroundings than normal noise of the same robust
+/// scale would put any of them with a probability of 10⁻³ (per log; Bonferroni). A sample that is not finite is
+/// none. Source: Hampel 1974.
 pub fn outliers(x: &[f64]) -> Vec<usize> {
     outliers_about(x, LEVEL * memory(x))
 }
 
-/// Samples after which noise behind a low-pass has forgotten what it was: a power of two from which on the robust power of differences hardly grows any more; 1 for white
-/// noise, and where it grows for ever (drift) or as long as the log is short.
+/// Samples after which noise behind a low-pass has forgotten what it was: a power of two from which on the robust
+/// power of differences hardly grows any more; 1 for white noise, and where it grows for ever (drift) or as long as
+/// the log is short.
 fn memory(x: &[f64]) -> usize {
     let stride = x.len() / JUDGED + 1;
     let power = |lag: usize| {
@@ -87,9 +92,9 @@ pub fn fill_outliers(x: &mut [f64]) -> Vec<usize> {
     found
 }
 
-/// Steps of the level, largest first, at most `most`: differences of the means of neighbouring blocks, of all lengths from 8 samples to a sixty-fourth of
-/// the log, that are larger than normal ones of the same robust scale would be with a probability of 10⁻³. A random walk, whose differences are
-/// normal, has none.
+/// Steps of the level, largest first, at most `most`: differences of the means of neighbouring blocks, of all
+/// lengths from 8 samples to a sixty-fourth of the log, that are larger than normal ones of the same robust scale
+/// would be with a probability of 10⁻³. A random walk, whose differences are normal, has none.
 pub fn steps(x: &[f64], most: usize) -> Vec<Step> {
     let lengths: Vec<usize> =
         std::iter::successors(Some(SHORTEST), |m| Some(2 * m)).take_while(|m| m * FEWEST <= x.len()).collect();
@@ -166,8 +171,9 @@ mod tests {
         x
     }
 
-    /// White noise, a random walk and both rounded coarsely: nothing, in 10 logs of each kind; each has a chance of 10⁻³ or so (4000 logs of
-    /// 10,000 samples of white noise: 4 with steps, 8 with outliers where limits were 2 % narrower), but the seeds are fixed.
+    /// White noise, a random walk and both rounded coarsely: nothing, in 10 logs of each kind; each has a chance of
+    /// 10⁻³ or so (4000 logs of 10,000 samples of white noise: 4 with steps, 8 with outliers where limits were 2 %
+    /// narrower), but the seeds are fixed.
     #[test]
     fn normal_noise_has_no_upsets() {
         for run in 0..10 {
@@ -188,8 +194,9 @@ mod tests {
         }
     }
 
-    /// Behind a low-pass of 32 samples (two poles at 0.9) neighbours are alike: no outlier in 10 logs of 50,000, where levels of 31 samples would find dozens in each; one of 12 standard
-    /// deviations is found. Means of a coarse converter's values are mostly equal but for rounding, and that is no scale.
+    /// Behind a low-pass of 32 samples (two poles at 0.9) neighbours are alike: no outlier in 10 logs of 50,000,
+    /// where levels of 31 samples would find dozens in each; one of 12 standard deviations is found. Means of a
+    /// coarse converter's values are mostly equal but for rounding, and that is no scale.
     #[test]
     fn coloured_noise_has_no_upsets() {
         let low_passed = |run: u64| {

@@ -49,8 +49,8 @@ struct AidGenerator {
 }
 
 impl Flight {
-    /// Starts at zero. `None` for a sensor at rest. Errors: a custom plant or an attitude, an aid whose rate is no whole fraction of the sample rate, an
-    /// accelerometer's line too fast for it.
+    /// Starts at zero. `None` for a sensor at rest. Errors: a custom plant or an attitude, an aid whose rate is no
+    /// whole fraction of the sample rate, an accelerometer's line too fast for it.
     pub fn new(design: &Design, axes: usize, scenario: &Scenario) -> Result<Option<Flight>, SimulateError> {
         let dt = 1.0 / scenario.rate_hz;
         let (gravity, accelerometer) = match &design.plant {

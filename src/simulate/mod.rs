@@ -1,7 +1,7 @@
 //! Parameters to a sensor stream with truth (floor 3).
 //!
-//! measured = true rate + bias + every noise term, then rounded and limited if asked. Exact discrete sample paths of each
-//! term come from [`crate::noise`]; every term of every axis draws from a stream of its own.
+//! measured = true rate + bias + every noise term, then rounded and limited if asked. Exact discrete sample paths of
+//! each term come from [`crate::noise`]; every term of every axis draws from a stream of its own.
 //!
 //! # Stream addresses
 //!
@@ -79,7 +79,8 @@ pub struct AxisBlock {
     pub true_rate: Vec<f64>,
     /// Constant bias, with the turn-on bias if it was drawn.
     pub bias: f64,
-    /// Sum of all drift terms ([`Kind::is_drift`]): everything that is neither true rate, constant bias nor noise of the measurement.
+    /// Sum of all drift terms ([`Kind::is_drift`]): everything that is neither true rate, constant bias nor noise of
+    /// the measurement.
     pub drift: Vec<f64>,
     /// Per term of the axis (order of `AxisParams::terms`), its contribution.
     pub terms: Vec<Vec<f64>>,
@@ -171,7 +172,8 @@ impl Simulator {
         Simulator::of_axes(params, scenario, 0)
     }
 
-    /// The same for a sensor beside others: its axes have the numbers `first`, `first + 1`, … in the addresses of streams.
+    /// The same for a sensor beside others: its axes have the numbers `first`, `first + 1`, … in the addresses of
+    /// streams.
     pub fn of_axes(params: &Params, scenario: &Scenario, first: u32) -> Result<Simulator, SimulateError> {
         scenario.check(params.axes.len())?;
         let dt = 1.0 / scenario.rate_hz;

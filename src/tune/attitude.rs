@@ -20,10 +20,11 @@ const SCALE: f64 = 0.005;
 const MOTION: f64 = 0.0015;
 /// Of an accelerometer nobody described: 3 mg.
 const FORCE_BIAS: f64 = 0.03;
-/// A gyro of which no drift was identified drifts all the same: a random walk of 0.0005 deg/s/sqrt(s), 0.03 deg/s in an hour.
+/// A gyro of which no drift was identified drifts all the same: a random walk of 0.0005 deg/s/sqrt(s), 0.03 deg/s in
+/// an hour.
 const UNSEEN_DRIFT: &str = "0.0005 deg/s/sqrt(s)";
-/// Body motions: ω₀ = 8 rad/s, that is velocities that last an eighth of a second; a rest is quieter than 0.05 m/s²; horizontal motion may
-/// be twice the vertical one, whose mean square is taken over a second.
+/// Body motions: ω₀ = 8 rad/s, that is velocities that last an eighth of a second; a rest is quieter than 0.05 m/s²;
+/// horizontal motion may be twice the vertical one, whose mean square is taken over a second.
 const ACCELERATION: Acceleration = Acceleration { std_dev: 0.05, ratio: 2.0, frequency: 8.0, memory: 1.0 };
 /// An aid of which nothing is said but its white noise may still be disturbed.
 const HEADING_TIME: f64 = 1.0;
@@ -132,7 +133,8 @@ fn drifting(axis: &AxisParams, warnings: &mut Vec<String>) -> AxisParams {
     axis
 }
 
-/// White noise and drift of an axis. Lines, moving averages and quantisation turn a body by nothing in the mean and are left out.
+/// White noise and drift of an axis. Lines, moving averages and quantisation turn a body by nothing in the mean and
+/// are left out.
 fn errors(
     axis: &AxisParams,
     quantity: Quantity,

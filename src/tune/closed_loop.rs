@@ -26,7 +26,8 @@ pub struct Share {
     pub share: f64,
 }
 
-/// The states that stay uncertain: those of driven processes. The others are learnt for good. None if `row` sees none of them.
+/// The states that stay uncertain: those of driven processes. The others are learnt for good. None if `row` sees
+/// none of them.
 pub(super) fn driven(model: &LinearModel, row: &DMatrix<f64>) -> Vec<usize> {
     let undriven = undriven_states(model);
     let driven: Vec<usize> = (0..model.states.len()).filter(|i| !undriven.contains(i)).collect();
@@ -75,13 +76,15 @@ fn process_sources(model: &LinearModel, noise: &[(String, DMatrix<f64>)]) -> Vec
     sources
 }
 
-/// How much of the final variance d P(k|k) dᵀ of an estimate d x each noise source causes, at a sample at which all measurements are taken.
+/// How much of the final variance d P(k|k) dᵀ of an estimate d x each noise source causes, at a sample at which all
+/// measurements are taken.
 ///
 /// In steady state the error obeys e ← (I − K H) F e + (I − K H) v − K w. It is linear, so each source has its own
-/// covariance X = A X Aᵀ + (I − K H) Q_i (I − K H)ᵀ or A X Aᵀ + K R_i Kᵀ, and they add up to P(k|k). With measurements at several rates
-/// A and the noise are those of one period. `noise`: process noise with names of its own ([`Augmented`](crate::model::Augmented)), the
-/// rest of Q is named by its states. The first measurement's noise is "white", that of others has their name ("heading.white").
-/// A constant bias causes nothing in the long run. Errors: the loop does not settle.
+/// covariance X = A X Aᵀ + (I − K H) Q_i (I − K H)ᵀ or A X Aᵀ + K R_i Kᵀ, and they add up to P(k|k). With
+/// measurements at several rates A and the noise are those of one period. `noise`: process noise with names of its
+/// own ([`Augmented`](crate::model::Augmented)), the rest of Q is named by its states. The first measurement's noise
+/// is "white", that of others has their name ("heading.white"). A constant bias causes nothing in the long run.
+/// Errors: the loop does not settle.
 pub fn error_budget(
     model: &LinearModel,
     steady: &SteadyState,
@@ -167,13 +170,14 @@ pub(super) fn settled(model: &LinearModel, kept: &[usize]) -> Result<LinearModel
     Ok(alone)
 }
 
-/// Frequency in Hz at which the estimate follows the measurement with half the power it has at zero frequency: that of the whole drift
-/// of a sensor at rest, that of the first state of a plant. Below it a plant's state follows what measures it, above it the sensor that is
-/// integrated, if there is one.
+/// Frequency in Hz at which the estimate follows the measurement with half the power it has at zero frequency: that
+/// of the whole drift of a sensor at rest, that of the first state of a plant. Below it a plant's state follows what
+/// measures it, above it the sensor that is integrated, if there is one.
 ///
-/// T(ω) = d [I − (I − K H) F e^(−jω dt)]⁻¹ K. For one pole λ near one it is (1 − λ)/(2π dt). With one measurement at every n-th sample F is
-/// that of n samples and dt their length; several measurements of the same thing move together. `None` when the steady gain is zero, the estimate
-/// follows up to half the rate of the measurements, or these are of several rates or units.
+/// T(ω) = d [I − (I − K H) F e^(−jω dt)]⁻¹ K. For one pole λ near one it is (1 − λ)/(2π dt). With one measurement at
+/// every n-th sample F is that of n samples and dt their length; several measurements of the same thing move
+/// together. `None` when the steady gain is zero, the estimate follows up to half the rate of the measurements, or
+/// these are of several rates or units.
 pub fn bandwidth_hz(model: &LinearModel, steady: &SteadyState) -> Option<f64> {
     let output = model.outputs.iter().find(|output| output.name != DRIFT);
     let row = output.map_or_else(|| model.drift_row(), |o| DMatrix::from_row_slice(1, o.row.len(), &o.row));

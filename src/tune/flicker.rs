@@ -16,7 +16,8 @@ pub struct FlickerApproximation {
     pub folded: usize,
     /// What they add to R, relatively.
     pub added_to_r: f64,
-    /// Largest relative error of the sensor's Allan deviation (all terms) for averaging times from one sample to `tau_max_s`.
+    /// Largest relative error of the sensor's Allan deviation (all terms) for averaging times from one sample to
+    /// `tau_max_s`.
     pub max_relative_error: f64,
     /// Averaging time of the largest error, s.
     pub worst_tau_s: f64,
@@ -28,10 +29,11 @@ const FOLDED: f64 = 0.01;
 /// Points per decade at which the curves are compared.
 const PER_DECADE: f64 = 16.0;
 
-/// Folds the fastest flicker states into R as long as they add no more than 1 % to it, and compares the Allan deviation of
-/// the result with that of `noise`, all sampled, up to `horizon_s`. `None` when there is no flicker.
+/// Folds the fastest flicker states into R as long as they add no more than 1 % to it, and compares the Allan
+/// deviation of the result with that of `noise`, all sampled, up to `horizon_s`. `None` when there is no flicker.
 ///
-/// A Gauss-Markov state faster than the filter is white to it, with the variance σ²(1 + φ)/(1 − φ) of its sum over many samples.
+/// A Gauss-Markov state faster than the filter is white to it, with the variance σ²(1 + φ)/(1 − φ) of its sum over
+/// many samples.
 pub(super) fn simplify(
     model: LinearModel,
     noise: &NoiseModel,

@@ -1,4 +1,5 @@
-//! What a design could be: when each state is known, what better parts buy, what wrong parameters cost. Everything is exact; nothing is simulated.
+//! What a design could be: when each state is known, what better parts buy, what wrong parameters cost. Everything
+//! is exact; nothing is simulated.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -52,8 +53,8 @@ pub struct Observed {
     pub initial_sigma: f64,
     /// In the end; zero for a constant.
     pub final_sigma: f64,
-    /// Time in s after which half of the variance that the measurements will ever take away is gone for good; absent when they take
-    /// none, or beyond the times looked at.
+    /// Time in s after which half of the variance that the measurements will ever take away is gone for good; absent
+    /// when they take none, or beyond the times looked at.
     pub half_s: Option<f64>,
     /// The same for 95 % of it.
     pub most_s: Option<f64>,
@@ -123,7 +124,8 @@ struct Watched {
 
 /// Insight into every axis of a design that [`tune`](super::tune()) made with `options`.
 ///
-/// With every trial the filter is designed anew (`worth`) or kept (`mistakes`, by [`expect_settled`]). Errors: the loop does not settle.
+/// With every trial the filter is designed anew (`worth`) or kept (`mistakes`, by [`expect_settled`]). Errors: the
+/// loop does not settle.
 pub fn insight(tuned: &Tuned, options: &TuneOptions) -> Result<Vec<Insight>, TuneError> {
     let axes = &tuned.design.axes;
     let mut all: Vec<Insight> = Vec::with_capacity(axes.len());
@@ -217,7 +219,8 @@ fn rows(model: &LinearModel) -> Vec<(Named, DMatrix<f64>)> {
     rows
 }
 
-/// √(d P(k|k) dᵀ) of the states that stay uncertain, at a sample at which every measurement is taken; zero when there are none.
+/// √(d P(k|k) dᵀ) of the states that stay uncertain, at a sample at which every measurement is taken; zero when
+/// there are none.
 fn steady_sigma(model: &LinearModel, row: &DMatrix<f64>) -> Result<f64, LinalgError> {
     let kept = driven(model, row);
     if kept.is_empty() {

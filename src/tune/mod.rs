@@ -1,10 +1,10 @@
 //! Noise parameters to a filter design: augmentation, steady state, predicted sigma(t), error budget (floor 4).
 //!
-//! `sensor` turns the parameters of an axis into a linear model (merging what no filter can tell apart), `plant` joins it with the
-//! documented plant and its aids, `prediction` propagates its
-//! covariance over any time, `closed_loop` splits the final variance into its causes and finds the bandwidth,
-//! `objective` chooses the physical `parameters`, `insight` says what other parts would buy, `under_truth` says what the design does when the
-//! sensor is another.
+//! `sensor` turns the parameters of an axis into a linear model (merging what no filter can tell apart), `plant`
+//! joins it with the documented plant and its aids, `prediction` propagates its covariance over any time,
+//! `closed_loop` splits the final variance into its causes and finds the bandwidth, `objective` chooses the physical
+//! `parameters`, `insight` says what other parts would buy, `under_truth` says what the design does when the sensor
+//! is another.
 
 mod attitude;
 mod closed_loop;
@@ -89,12 +89,14 @@ pub struct AxisReport {
     pub predicted: Predicted,
     /// Four time constants of the slowest closed-loop pole of the driven states, s.
     pub settling_time_s: f64,
-    /// Time after which the predicted sigma of the whole drift stays within 5 % of its final value; absent when there is none.
+    /// Time after which the predicted sigma of the whole drift stays within 5 % of its final value; absent when
+    /// there is none.
     pub drift_settling_time_s: Option<f64>,
-    /// Frequency at which the estimate follows the drift with half the power it has at rest; absent when the filter follows no drift (no error budget,
-    /// then), or drift at all frequencies up to half the sample rate.
+    /// Frequency at which the estimate follows the drift with half the power it has at rest; absent when the filter
+    /// follows no drift (no error budget, then), or drift at all frequencies up to half the sample rate.
     pub bandwidth_hz: Option<f64>,
-    /// Causes of the final variance of the drift estimate; the shares sum to one. Empty when that variance tends to zero.
+    /// Causes of the final variance of the drift estimate; the shares sum to one. Empty when that variance tends to
+    /// zero.
     pub error_budget: Vec<Share>,
     /// The same of every state of the plant; empty for a sensor at rest.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -123,13 +125,13 @@ pub struct Tuned {
 
 /// The augmented Kalman filter of every axis of `params`.
 ///
-/// States are the constant bias and those of each process, discretised exactly; R = N²/dt; P0 of the bias is the turn-on bias, that
-/// of a process its stationary variance. A rate random walk has the same dynamics as the constant bias and shares its state;
-/// flicker is a chain of Gauss-Markov states. Lines, moving averages and quantisation are noise of the measurement: they have states, but are no
-/// part of the drift.
+/// States are the constant bias and those of each process, discretised exactly; R = N²/dt; P0 of the bias is the
+/// turn-on bias, that of a process its stationary variance. A rate random walk has the same dynamics as the constant
+/// bias and shares its state; flicker is a chain of Gauss-Markov states. Lines, moving averages and quantisation are
+/// noise of the measurement: they have states, but are no part of the drift.
 ///
-/// The plant is that of `options`, else that of the parameters, else the sensor rests.
-/// Errors: no white noise, a line not below half the sample rate, a plant that does not fit, or a model without a steady state.
+/// The plant is that of `options`, else that of the parameters, else the sensor rests. Errors: no white noise, a
+/// line not below half the sample rate, a plant that does not fit, or a model without a steady state.
 pub fn tune(params: &Params, options: &TuneOptions) -> Result<Tuned, TuneError> {
     let chosen = options.design.clone().or_else(|| params.design.clone()).unwrap_or_default();
     let mut axes = Vec::with_capacity(params.axes.len());
@@ -167,8 +169,8 @@ fn record_check(params: &Params, tuning: &mut serde_json::Value) {
     }
 }
 
-/// The linear model that [`tune`] builds a filter on, with which such a sensor in its plant can also be simulated; `dt` in s. The plant is
-/// that of `options`; without one the sensor rests.
+/// The linear model that [`tune`] builds a filter on, with which such a sensor in its plant can also be simulated;
+/// `dt` in s. The plant is that of `options`; without one the sensor rests.
 ///
 /// Errors: no white noise, `dt` or the flicker horizon out of range, a plant that does not fit.
 pub fn sensor_model(
@@ -232,8 +234,9 @@ fn tune_axis(
     Ok((design, report))
 }
 
-/// After the first sample the covariance has entries of the size of h P0 hᵀ, whose sum along h is R, and the errors of that sum are
-/// judged by its inverse. At 4·10³ ε the mean NEES of the first epoch, two states, is 57 instead of 1; at 3·10⁴ ε it is 1.
+/// After the first sample the covariance has entries of the size of h P0 hᵀ, whose sum along h is R, and the errors
+/// of that sum are judged by its inverse. At 4·10³ ε the mean NEES of the first epoch, two states, is 57 instead of
+/// 1; at 3·10⁴ ε it is 1.
 const LEAST_VARIANCE_RATIO: f64 = 3e4 * f64::EPSILON;
 
 /// What must be said where the covariance after one sample cannot be held in double precision.

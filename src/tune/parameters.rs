@@ -24,7 +24,8 @@ pub(super) struct Prior {
 }
 
 impl Parameter {
-    /// The normal law of the logarithm of which the 95 % interval is the middle 95 %; `None` without an interval, or with an open or empty one.
+    /// The normal law of the logarithm of which the 95 % interval is the middle 95 %; `None` without an interval, or
+    /// with an open or empty one.
     pub(super) fn prior(&self) -> Option<Prior> {
         let [lower, upper] = self.value.interval_si()?.map(f64::ln);
         let prior = Prior { mean: 0.5 * (lower + upper), std_dev: (upper - lower) / (2.0 * NORMAL_95) };
@@ -61,8 +62,9 @@ pub(super) struct Group {
 }
 
 impl Space {
-    /// `hold`: paths, or the beginnings of paths (`gauss_markov`), with the name of an axis before them or not. The slope of a ramp never moves:
-    /// it is no noise. Errors: a name that is none of the parameters, or nothing left to move.
+    /// `hold`: paths, or the beginnings of paths (`gauss_markov`), with the name of an axis before them or not. The
+    /// slope of a ramp never moves: it is no noise. Errors: a name that is none of the parameters, or nothing left
+    /// to move.
     pub(super) fn new(params: &Params, design: &Design, hold: &[String]) -> Result<Space, ObjectiveError> {
         let mut copy = params.clone();
         let mut shared = design.clone();

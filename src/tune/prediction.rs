@@ -31,8 +31,8 @@ pub struct Predicted {
 /// Within this share of its final value the drift estimate counts as settled.
 const SETTLED: f64 = 0.05;
 
-/// Time in s after which the predicted sigma of the whole drift stays within 5 % of `final_sigma`; `None` when that is beyond the
-/// times of `predicted`, or when the final sigma is zero.
+/// Time in s after which the predicted sigma of the whole drift stays within 5 % of `final_sigma`; `None` when that
+/// is beyond the times of `predicted`, or when the final sigma is zero.
 pub(super) fn drift_settling_time(
     model: &LinearModel,
     predicted: &Predicted,
@@ -45,8 +45,8 @@ pub(super) fn drift_settling_time(
     settled_after(model, predicted, &predicted.total, |p| drift_sigma(model, p), outside)
 }
 
-/// Time in s after which a sigma is never `outside` again; `None` when that is beyond the times of `predicted`. `sigmas` are those at
-/// these times, `sigma_of` takes them from a covariance.
+/// Time in s after which a sigma is never `outside` again; `None` when that is beyond the times of `predicted`.
+/// `sigmas` are those at these times, `sigma_of` takes them from a covariance.
 pub(super) fn settled_after(
     model: &LinearModel,
     predicted: &Predicted,
@@ -114,8 +114,8 @@ fn updated(model: &LinearModel, taken: &[usize], p: DMatrix<f64>) -> Result<DMat
     Ok(next)
 }
 
-/// Predicted standard deviations at log-spaced times: the first measurement, then eight per decade to ten settling times or more.
-/// With measurements at several rates, times beyond the period are those at which all are taken.
+/// Predicted standard deviations at log-spaced times: the first measurement, then eight per decade to ten settling
+/// times or more. With measurements at several rates, times beyond the period are those at which all are taken.
 pub fn predicted_sigma(model: &LinearModel, settling_time_s: f64) -> Result<Predicted, LinalgError> {
     let span = (10.0 * settling_time_s).max(SHORTEST_SPAN).max(100.0 * model.dt);
     let most = (span / model.dt).min(MOST_STEPS);

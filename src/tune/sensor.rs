@@ -157,8 +157,8 @@ fn together(a: &Term, b: &Term) -> Option<Term> {
     }
 }
 
-/// States that hold their value and are seen directly (bias, rate random walk, level of a ramp) can only be known as a sum:
-/// they become the one state "bias". With T summing them, F' T = T F, Q' = T Q Tᵀ, P0' = T P0 Tᵀ.
+/// States that hold their value and are seen directly (bias, rate random walk, level of a ramp) can only be known as
+/// a sum: they become the one state "bias". With T summing them, F' T = T F, Q' = T Q Tᵀ, P0' = T P0 Tᵀ.
 fn share_level(model: LinearModel, warnings: &mut Vec<String>) -> LinearModel {
     let n = model.states.len();
     let holds =

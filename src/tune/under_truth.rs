@@ -1,4 +1,5 @@
-//! What a design does when the sensor is another: real against claimed errors over time, exactly and without simulation.
+//! What a design does when the sensor is another: real against claimed errors over time, exactly and without
+//! simulation.
 
 use nalgebra::DMatrix;
 use schemars::JsonSchema;
@@ -62,8 +63,8 @@ pub struct UnderTruth {
     pub drift: ErrorOverTime,
     /// Every state, in the order of the model; empty when the truth has other states.
     pub states: Vec<ErrorOverTime>,
-    /// `E[NEES]` at each time, divided by its number of components: 1 as claimed; null where the filter claims to know something exactly. Of all states,
-    /// or of the whole drift when the truth has other states.
+    /// `E[NEES]` at each time, divided by its number of components: 1 as claimed; null where the filter claims to
+    /// know something exactly. Of all states, or of the whole drift when the truth has other states.
     pub nees: Vec<Option<f64>>,
     /// `E[NIS]`, mean over all measurements: 1 as claimed.
     pub nis: f64,
@@ -74,10 +75,11 @@ pub struct UnderTruth {
     pub notes: Vec<String>,
 }
 
-/// Every axis of the design with its sensor replaced by the one of the same name in `truth`, sampled at the design's rate.
+/// Every axis of the design with its sensor replaced by the one of the same name in `truth`, sampled at the design's
+/// rate.
 ///
-/// The truth starts at its own x0, P0 (bias and turn-on bias), the filter at its own; at most a million steps are followed.
-/// Errors: another quantity, other axes, a truth without white noise.
+/// The truth starts at its own x0, P0 (bias and turn-on bias), the filter at its own; at most a million steps are
+/// followed. Errors: another quantity, other axes, a truth without white noise.
 pub fn under_truth(tuned: &Tuned, truth: &Params, options: &TuneOptions) -> Result<Vec<UnderTruth>, TuneError> {
     let design = &tuned.design;
     if truth.quantity != design.quantity {

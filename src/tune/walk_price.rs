@@ -13,7 +13,8 @@ use crate::units::Quantity;
 
 /// How long the start is followed, s.
 const START: f64 = 60.0;
-/// Points over which the least price is looked for before it is bracketed: two neighbours are less than a factor of three apart.
+/// Points over which the least price is looked for before it is bracketed: two neighbours are less than a factor of
+/// three apart.
 const COARSE: usize = 12;
 /// K is looked for to this share of the bracket, where the price is flat.
 const WIDTH: f64 = 4e-3;
@@ -107,8 +108,8 @@ impl WalkTrial {
         fine.then_some(WalkTrial { filter, sensor, truth, kept, least_settled, least_start })
     }
 
-    /// The price of the walk `k` (unit/s/√Hz), exactly, from the covariances of both filters in the true sensor's errors.
-    /// The filter starts with the spread of bias and drift together. `None` where it does not settle.
+    /// The price of the walk `k` (unit/s/√Hz), exactly, from the covariances of both filters in the true sensor's
+    /// errors. The filter starts with the spread of bias and drift together. `None` where it does not settle.
     pub fn price(&self, k: f64) -> Option<WalkPrice> {
         let spread = self.sensor.processes.iter().fold(self.filter.bias_std_dev, |sum, [sigma, _]| sum.hypot(*sigma));
         let simple = model(&self.sensor, &self.filter, &[], k, spread);
@@ -157,7 +158,8 @@ impl WalkTrial {
     }
 }
 
-/// The walk for several sensors at once: the largest price is least. It lies between those of the sensors, `least` by [`WalkTrial::least`].
+/// The walk for several sensors at once: the largest price is least. It lies between those of the sensors, `least`
+/// by [`WalkTrial::least`].
 pub fn shared_walk(trials: &[&WalkTrial], least: &[f64]) -> f64 {
     let ends = |of: fn(f64, f64) -> f64| least.iter().copied().reduce(of).unwrap_or(0.0);
     let (low, high) = (ends(f64::min), ends(f64::max));
@@ -175,8 +177,9 @@ fn valley(price: impl Fn(f64) -> f64, low: f64, high: f64) -> f64 {
     lowest(price, low, high, WIDTH * (high - low))
 }
 
-/// From one measurement to the next: y_1 ← y_1 + dt y_2 …, the last y ← y + dt (b + Σ d_i + w), var w = N²/dt, each step; b a walk of density `walk`
-/// from N(0, `bias`²), d_i the processes. y_1 is measured. The step of the model is that of the aid.
+/// From one measurement to the next: y_1 ← y_1 + dt y_2 …, the last y ← y + dt (b + Σ d_i + w), var w = N²/dt, each
+/// step; b a walk of density `walk` from N(0, `bias`²), d_i the processes. y_1 is measured. The step of the model is
+/// that of the aid.
 fn model(sensor: &SensorDrift, filter: &AidedFilter, processes: &[[f64; 2]], walk: f64, bias: f64) -> LinearModel {
     let (dt, m) = (filter.step, filter.integrals);
     let n = m + 1 + processes.len();

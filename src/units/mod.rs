@@ -18,8 +18,8 @@ pub use amount::amount;
 pub use plain::{plain, plain_lines};
 use symbol::Symbol;
 
-/// In SI nothing that a sensor gives or has is larger, and nothing but zero smaller than its inverse: fourth powers, ratios of them, and sums of
-/// as many as a log has samples stay in the range of doubles.
+/// In SI nothing that a sensor gives or has is larger, and nothing but zero smaller than its inverse: fourth powers,
+/// ratios of them, and sums of as many as a log has samples stay in the range of doubles.
 pub const LARGEST: f64 = 1e30;
 
 /// Exponents of the base dimensions **times two**, so that `1/sqrt(Hz)` is exact.
@@ -96,7 +96,8 @@ impl Unit {
     /// Parses every spelling people print: `deg/sqrt(h)`, `deg/s/√Hz`, `°/s`, `mdps`, `ug/sqrt(Hz)`,
     /// `[rad s^-1]`, `m/s²`, `1/131 deg/s` (a leading number or fraction scales) …
     ///
-    /// `g` is standard gravity, 9.80665 m/s². What can be read in two ways (`deg/s·√Hz`, `G`, `d`) is refused with a hint.
+    /// `g` is standard gravity, 9.80665 m/s². What can be read in two ways (`deg/s·√Hz`, `G`, `d`) is refused with a
+    /// hint.
     pub fn parse(text: &str) -> Result<Unit, UnitError> {
         parse::unit(text)
     }
@@ -141,7 +142,8 @@ impl Unit {
         })
     }
     /// The unit times `time^(half_powers/2)` in the same spelling family: `deg/s` with +1 gives `deg/s/sqrt(Hz)`,
-    /// with −1 `deg/s/sqrt(s)`, with +2 the integral (`deg`), with −2 `deg/s^2`. Used to print parameters in the log's own unit.
+    /// with −1 `deg/s/sqrt(s)`, with +2 the integral (`deg`), with −2 `deg/s^2`. Used to print parameters in the
+    /// log's own unit.
     ///
     /// The time unit of the family is kept (`deg/h` with −1 gives `deg/h/sqrt(h)`). A leading number (the step of a
     /// converter, `1/131 deg/s`) is dropped, also with 0: parameters are printed in the physical unit.

@@ -5,8 +5,8 @@ use std::borrow::Cow;
 /// What stands for a character that is left out.
 const LEFT_OUT: char = char::REPLACEMENT_CHARACTER;
 
-/// Controls (Unicode's Cc: escape, line ends, U+0085), separators of lines and paragraphs, and what turns the direction of the words that follow
-/// (Unicode Standard Annex 9, explicit formatting and implicit marks).
+/// Controls (Unicode's Cc: escape, line ends, U+0085), separators of lines and paragraphs, and what turns the
+/// direction of the words that follow (Unicode Standard Annex 9, explicit formatting and implicit marks).
 fn acts(c: char) -> bool {
     c.is_control()
         || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')

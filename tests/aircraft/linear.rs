@@ -152,8 +152,8 @@ fn moves_at_every_step(document: &serde_json::Value) {
     }
 }
 
-/// The sheet's optimal gains in flight: a small way from trim and without servos, the airplane moves by xₖ₊₁ = (F − G K)
-/// xₖ, F and G of all eight states over a sample.
+/// The sheet's optimal gains in flight: a small way from trim and without servos, the airplane moves by xₖ₊₁ = (F −
+/// G K) xₖ, F and G of all eight states over a sample.
 #[test]
 fn the_regulator_brings_the_airplane_back_as_its_gains_say() {
     const RATE: f64 = 400.0;

@@ -48,8 +48,9 @@ fn diagonal_is_the_degrees_of_freedom() {
     assert!(edf::covariance(&[1, 9], 10, 1.0, &mixture)[(1, 0)].is_nan());
 }
 
-/// 2000 simulated logs: every entry within 6 standard errors (estimated from the products themselves), every mean within 5.
-/// False alarm below 1e-5: fifteen entries and five means, normal tails 2e-9 and 6e-7 each, widened for skewness.
+/// 2000 simulated logs: every entry within 6 standard errors (estimated from the products themselves), every mean
+/// within 5. False alarm below 1e-5: fifteen entries and five means, normal tails 2e-9 and 6e-7 each, widened for
+/// skewness.
 #[test]
 fn monte_carlo() {
     let (n, dt, runs) = (1000, 0.1, 2000);

@@ -1,4 +1,5 @@
-//! Every deviation against its definition in whole numbers, where nothing is rounded; the same bits from any number of threads.
+//! Every deviation against its definition in whole numbers, where nothing is rounded; the same bits from any number
+//! of threads.
 
 use super::*;
 
@@ -58,7 +59,8 @@ fn definition(kind: Deviation, x: &[i64], m: usize) -> f64 {
 
 /// Lengths around the windows of 16384 start points and the lanes of 16, factors from one sample to all that fit.
 ///
-/// Tolerance: at most 1200 roundings of a positive sum and a few of the norm, 1.4e-13; MDEV's moved sums are whole numbers here.
+/// Tolerance: at most 1200 roundings of a positive sum and a few of the norm, 1.4e-13; MDEV's moved sums are whole
+/// numbers here.
 #[test]
 fn every_deviation_is_its_definition() {
     for n in [6, 17, 100, 16_385, 16_384 + 2 * 100, 50_003] {
@@ -80,8 +82,9 @@ fn every_deviation_is_its_definition() {
     }
 }
 
-/// Against sums that are compensated at every step. Within a block of 8192 samples, eight chains of 1024, roundings of at most the largest phase
-/// add up: below 1100 units of 2^−53 of it; and the mean, off by as much as it is rounded, tilts the line by n 2^−53 of itself.
+/// Against sums that are compensated at every step. Within a block of 8192 samples, eight chains of 1024, roundings
+/// of at most the largest phase add up: below 1100 units of 2^−53 of it; and the mean, off by as much as it is
+/// rounded, tilts the line by n 2^−53 of itself.
 #[test]
 fn phase_is_the_compensated_sum() {
     for n in [1, 8191, 8192, 50_000] {

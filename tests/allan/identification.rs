@@ -34,7 +34,8 @@ fn ramp_and_few_and_constant() {
     assert!(constant.points.iter().all(|p| (p.lower, p.deviation, p.upper) == (0.0, 0.0, 0.0)));
 }
 
-/// White with a ramp of random numbers of our own stream: longest taus take the type last seen for their degrees of freedom.
+/// White with a ramp of random numbers of our own stream: longest taus take the type last seen for their degrees of
+/// freedom.
 #[test]
 fn long_taus_keep_the_last_type() {
     let mut rate = vec![0.0; 4096];

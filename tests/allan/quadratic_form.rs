@@ -2,7 +2,8 @@
 
 use super::*;
 
-/// Covariance and mean of n consecutive samples. The walk starts anywhere; quantisation is the difference of a white angle error.
+/// Covariance and mean of n consecutive samples. The walk starts anywhere; quantisation is the difference of a white
+/// angle error.
 pub(super) fn samples(model: &NoiseModel, n: usize, dt: f64) -> (DMatrix<f64>, DVector<f64>) {
     let mut covariance = DMatrix::zeros(n, n);
     let mut mean = DVector::zeros(n);

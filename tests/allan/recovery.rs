@@ -25,8 +25,9 @@ fn curves_of_single_terms() {
     }
 }
 
-/// The 95 % interval of the refined curve holds the true deviation 95 % of the time: 2000 logs of white + Gauss-Markov at
-/// three taus. Allowed 92.4 … 97.6 %: 5 standard errors (0.49 % each) and 0.15 % for the chi-square shape; false alarm 2e-6.
+/// The 95 % interval of the refined curve holds the true deviation 95 % of the time: 2000 logs of white +
+/// Gauss-Markov at three taus. Allowed 92.4 … 97.6 %: 5 standard errors (0.49 % each) and 0.15 % for the chi-square
+/// shape; false alarm 2e-6.
 #[test]
 fn interval_coverage() {
     let (n, dt, runs) = (1000, 0.1, 2000);

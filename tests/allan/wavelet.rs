@@ -4,8 +4,8 @@ use kfdesign::allan::wavelet;
 
 use super::*;
 
-/// The pyramid of the maximum-overlap transform with the Haar filters ½(1, −1) and ½(1, 1), without the coefficients that the start of the log
-/// touches; rounding.
+/// The pyramid of the maximum-overlap transform with the Haar filters ½(1, −1) and ½(1, 1), without the coefficients
+/// that the start of the log touches; rounding.
 #[test]
 fn mean_square_of_the_coefficients() {
     let rate = walk();
@@ -27,8 +27,9 @@ fn mean_square_of_the_coefficients() {
     assert!(wavelet::levels(&other).is_empty());
 }
 
-/// As printed for the method of wavelet moments (Guerrier et al. 2013, table 1; the same in the R package), τ = 2^j samples: white s²/τ;
-/// quantisation 6Q²/τ²; first-order autoregression υ²[(φ² − 1)τ + 2φ(φ^τ − 4φ^{τ/2} + 3)]/((φ − 1)³(φ + 1)τ²); random walk γ²(τ² + 2)/(12τ); drift ω²τ²/16.
+/// As printed for the method of wavelet moments (Guerrier et al. 2013, table 1; the same in the R package), τ = 2^j
+/// samples: white s²/τ; quantisation 6Q²/τ²; first-order autoregression υ²[(φ² − 1)τ + 2φ(φ^τ − 4φ^{τ/2} + 3)]/((φ −
+/// 1)³(φ + 1)τ²); random walk γ²(τ² + 2)/(12τ); drift ω²τ²/16.
 #[test]
 fn closed_forms() {
     let dt = 0.25_f64;

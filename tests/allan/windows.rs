@@ -4,8 +4,8 @@ use super::*;
 use crate::support::Bench;
 use kfdesign::allan::Pooled;
 
-/// The mean over windows of the same length is the mean square over all differences within windows; degrees of freedom add up.
-/// Tolerance: some roundings of sums of positive numbers.
+/// The mean over windows of the same length is the mean square over all differences within windows; degrees of
+/// freedom add up. Tolerance: some roundings of sums of positive numbers.
 #[test]
 fn pooled_curve_is_its_definition() {
     let mixture = model(&[Term::White { density: 0.1 }, gauss_markov(0.05, 20.0)]);
@@ -54,9 +54,9 @@ fn one_window_is_the_log() {
     }
 }
 
-/// The variance of the pooled estimate is 2 V²/edf with the degrees of freedom added up, although the windows of a Gauss-Markov process with a
-/// correlation time of a tenth of a window are not quite independent. 400 logs: the sample variance has a standard deviation of 7 %; within 4 of
-/// them at five averaging times, false alarms 3e-4.
+/// The variance of the pooled estimate is 2 V²/edf with the degrees of freedom added up, although the windows of a
+/// Gauss-Markov process with a correlation time of a tenth of a window are not quite independent. 400 logs: the
+/// sample variance has a standard deviation of 7 %; within 4 of them at five averaging times, false alarms 3e-4.
 #[test]
 fn degrees_of_freedom_add_up() {
     let mixture = model(&[Term::White { density: 0.1 }, gauss_markov(0.1, 30.0)]);
@@ -91,7 +91,8 @@ fn log(rate: &[f64]) -> String {
     std::iter::once("x (rad/s)\n".to_string()).chain(rows).collect()
 }
 
-/// The command in windows: the truth lies in the intervals, the document says how many windows, stderr what was left out.
+/// The command in windows: the truth lies in the intervals, the document says how many windows, stderr what was left
+/// out.
 #[test]
 fn command_recovers_the_truth() {
     let mixture = model(&[Term::White { density: 0.01 }, gauss_markov(0.003, 20.0)]);

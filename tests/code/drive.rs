@@ -182,7 +182,8 @@ impl Toolchain {
         Some(self.command("sh", &["-c".to_owned(), line.to_owned()]).unwrap())
     }
 
-    /// Compiles the modules as a `no_std` library that denies warnings, and a program `rust` with it; rustc is where cargo is.
+    /// Compiles the modules as a `no_std` library that denies warnings, and a program `rust` with it; rustc is where
+    /// cargo is.
     pub(super) fn rust(&self, modules: &str, main: &str) {
         let library = format!("#![no_std]\n#![deny(warnings)]\n#![forbid(unsafe_code)]\n{modules}");
         std::fs::write(self.folder.join("generated.rs"), library).unwrap();
@@ -221,7 +222,8 @@ impl Toolchain {
         told.stdout.as_chunks::<8>().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect()
     }
 
-    /// What each case gives, per row: ν and S of each measurement (NaN: not taken), x, and P_ii (NaN in the constant form). `None`: no gcc.
+    /// What each case gives, per row: ν and S of each measurement (NaN: not taken), x, and P_ii (NaN in the constant
+    /// form). `None`: no gcc.
     pub(super) fn drive_c(&self, cases: &[Case]) -> Option<Vec<Vec<f64>>> {
         let mut names: Vec<&str> = cases.iter().map(|case| case.name.as_str()).collect();
         names.dedup();

@@ -29,8 +29,8 @@ fn models() -> Vec<(&'static str, Vec<Term>)> {
     ]
 }
 
-/// Shares of p < 0.01 and p < 0.05 per test over 1000 logs of 6000 samples, and of rejected logs at level 0.01, for docs/validation.md:
-/// `cargo test --release -- --ignored --nocapture false_alarms_of_compare`.
+/// Shares of p < 0.01 and p < 0.05 per test over 1000 logs of 6000 samples, and of rejected logs at level 0.01, for
+/// docs/validation.md: `cargo test --release -- --ignored --nocapture false_alarms_of_compare`.
 #[test]
 #[ignore = "a study of minutes; its table is in docs/validation.md"]
 fn false_alarms_of_compare() {

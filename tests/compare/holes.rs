@@ -29,8 +29,8 @@ pub fn three_in_a_hundred(sample: usize) -> bool {
     sample / 3 * 7919 % 1000 < 30 && sample > 3
 }
 
-/// Three of every hundred samples are missing. 30 logs of their own model, of which 1.5 % are rejected (1000 twice as long, docs/validation.md): six or more of
-/// 30 with a probability of 5e-6, and of 2e-4 were it twice that.
+/// Three of every hundred samples are missing. 30 logs of their own model, of which 1.5 % are rejected (1000 twice
+/// as long, docs/validation.md): six or more of 30 with a probability of 5e-6, and of 2e-4 were it twice that.
 #[test]
 fn true_models_are_kept_beside_holes() {
     let model = [WHITE, drift(0.05)];
@@ -54,8 +54,9 @@ fn true_models_are_kept_beside_holes() {
     }
 }
 
-/// The louder third of a log is before a hole that is too long to fill, so the curves do not see it; the filter does: (8000·4 + 12,000)/20,000 = 2.2 for the mean of NIS (five standard
-/// deviations: √(2 (8000·16 + 12,000))/20,000 = 0.0265).
+/// The louder third of a log is before a hole that is too long to fill, so the curves do not see it; the filter
+/// does: (8000·4 + 12,000)/20,000 = 2.2 for the mean of NIS (five standard deviations: √(2 (8000·16 +
+/// 12,000))/20,000 = 0.0265).
 #[test]
 fn the_filter_sees_both_sides_of_a_long_hole() {
     let of = |density: f64, samples, run| log(&params(&[Term::White { density }]), samples, run).axes.remove(0).rate;
@@ -69,8 +70,9 @@ fn the_filter_sees_both_sides_of_a_long_hole() {
     assert_eq!((found.axes[0].samples, found.axes[0].left_out), (12_000, 8000));
 }
 
-/// A random walk goes on in a hole of 20,000 samples beside 1000 on either side: K √(2000 s) = 4.5 where a step is 0.05. A filter that did not know of the hole would have one innovation of some
-/// ninety standard deviations, and a mean of NIS of about 5.
+/// A random walk goes on in a hole of 20,000 samples beside 1000 on either side: K √(2000 s) = 4.5 where a step is
+/// 0.05. A filter that did not know of the hole would have one innovation of some ninety standard deviations, and a
+/// mean of NIS of about 5.
 #[test]
 fn drift_goes_on_in_a_hole() {
     let model = [Term::White { density: 0.01 }, Term::RateRandomWalk { density: 0.1 }];
@@ -86,7 +88,8 @@ fn drift_goes_on_in_a_hole() {
     assert!((nis - 1.0).abs() < 5.0 * 0.032, "{nis}");
 }
 
-/// Half an hour of the reference sensor at 10 Hz, one row of fifty missing: all of it is compared, and the numbers are those of a log without holes but for the samples that are gone.
+/// Half an hour of the reference sensor at 10 Hz, one row of fifty missing: all of it is compared, and the numbers
+/// are those of a log without holes but for the samples that are gone.
 #[test]
 fn the_command_fills_short_holes() {
     let bench = Bench::new();
@@ -113,8 +116,9 @@ fn the_command_fills_short_holes() {
     assert!(words.contains("stands for the log in curves and spectra") && words.contains("filled in"), "{words}");
 }
 
-/// Sways of 100 deg/s at 2 Hz: no line between two levels is what they did in a hole of 20 samples, so the factor is that of the eight
-/// times 679 samples between them (544 coefficients each above 10 Hz, half of a degree of freedom each: 1/√(8·544) = 1.5 %; five of these).
+/// Sways of 100 deg/s at 2 Hz: no line between two levels is what they did in a hole of 20 samples, so the factor is
+/// that of the eight times 679 samples between them (544 coefficients each above 10 Hz, half of a degree of freedom
+/// each: 1/√(8·544) = 1.5 %; five of these).
 #[test]
 fn nothing_is_filled_in_where_the_log_moves() {
     let bench = Bench::new();

@@ -20,7 +20,8 @@ fn of(model: &[Term], log: &Log) -> AxisInflation {
     inflation(&params(model), log, FROM).unwrap().axes.remove(0)
 }
 
-/// Adds a motion in which everything is slow: turns of some hundred times the noise, not the same at the end as at the start.
+/// Adds a motion in which everything is slow: turns of some hundred times the noise, not the same at the end as at
+/// the start.
 pub fn moved(mut log: Log) -> Log {
     for axis in &mut log.axes {
         for (k, x) in axis.rate.iter_mut().enumerate() {
@@ -31,8 +32,8 @@ pub fn moved(mut log: Log) -> Log {
     log
 }
 
-/// 20 000 samples: 18 000 coefficients, √(1/(2·18 000)) = 0.53 % standard deviation of the factor, 0.87 % of the robust one; five of each
-/// (false alarm 6e-7 for each). With violent motion below the band as without.
+/// 20 000 samples: 18 000 coefficients, √(1/(2·18 000)) = 0.53 % standard deviation of the factor, 0.87 % of the
+/// robust one; five of each (false alarm 6e-7 for each). With violent motion below the band as without.
 #[test]
 fn the_factor_is_found_under_motion() {
     for (run, factor) in [(0, 1.0), (1, 3.5)] {
@@ -46,8 +47,9 @@ fn the_factor_is_found_under_motion() {
     }
 }
 
-/// 200 logs: the 95 % intervals cover the truth 179 times at least and 200 at most (fewer than 177 with probability 3e-5 at exactly 95 %;
-/// 174 with 1e-6), and their width is that of the estimates' own scatter within 20 % (its standard deviation is 5 %).
+/// 200 logs: the 95 % intervals cover the truth 179 times at least and 200 at most (fewer than 177 with probability
+/// 3e-5 at exactly 95 %; 174 with 1e-6), and their width is that of the estimates' own scatter within 20 % (its
+/// standard deviation is 5 %).
 #[test]
 fn the_intervals_cover() {
     let found: Vec<AxisInflation> =
@@ -55,7 +57,8 @@ fn the_intervals_cover() {
     check_intervals(&found, 174..=200, 0.3);
 }
 
-/// Both intervals hold the factor 2 so often, and are as wide as 1.96 times the scatter of the estimates on both sides, but for a share.
+/// Both intervals hold the factor 2 so often, and are as wide as 1.96 times the scatter of the estimates on both
+/// sides, but for a share.
 pub fn check_intervals(found: &[AxisInflation], covering: RangeInclusive<usize>, share: f64) {
     let n = found.len() as f64;
     for pick in [|a: &AxisInflation| (a.factor, a.interval), |a: &AxisInflation| (a.robust_factor, a.robust_interval)] {
@@ -67,8 +70,9 @@ pub fn check_intervals(found: &[AxisInflation], covering: RangeInclusive<usize>,
     }
 }
 
-/// A narrow line of three times a sample's power: the mean counts it, the median does not, and it is listed where it is with its size.
-/// Its power over 2000 s at a correlation time of 50 s has 40 independent values: 22 %; sigma 11 %.
+/// A narrow line of three times a sample's power: the mean counts it, the median does not, and it is listed where it
+/// is with its size. Its power over 2000 s at a correlation time of 50 s has 40 independent values: 22 %; sigma 11
+/// %.
 #[test]
 fn a_line_shows_as_a_difference() {
     let line = Term::Oscillation { std_dev: 0.5, frequency_hz: 2.0, correlation_time: 50.0 };
@@ -120,7 +124,8 @@ fn the_inflated_parameters() {
     let limited = inflated(&params(&[WHITE, Term::BandLimit { density: 0.1, filter }, DRIFT]), &found);
     let note = limited.source.unwrap().note.unwrap();
     assert!(note.starts_with("white and band_limit densities multiplied: x "), "{note}");
-    // read again and measured again, the factor is one but for the drift, which has 2σ²Tc/(2πfTc)² over 0.02: 1e-3 of the power at 0.5 Hz
+    // read again and measured again, the factor is one but for the drift, which has 2σ²Tc/(2πfTc)² over 0.02: 1e-3
+    // of the power at 0.5 Hz
     let again = Params::from_json(&out.to_json(), "p").unwrap();
     assert!((inflation(&again, &flight, FROM).unwrap().axes[0].factor - 1.0).abs() < 1e-3);
     let refused = inflation(&params(&[DRIFT]), &flight, FROM).unwrap_err().to_string();
@@ -130,8 +135,9 @@ fn the_inflated_parameters() {
     assert!(few.contains("80 spectral coefficients above 4.000 Hz") || few.contains("79 spectral"), "{few}");
 }
 
-/// Noise three times as loud before a low-pass, the converter's own behind it as it was: the factor is that of what passes. Between half a hertz and half power at
-/// one there are 2000 coefficients: 1.6 %, five of it (6e-7); where nothing passes the log is as loud as the bench.
+/// Noise three times as loud before a low-pass, the converter's own behind it as it was: the factor is that of what
+/// passes. Between half a hertz and half power at one there are 2000 coefficients: 1.6 %, five of it (6e-7); where
+/// nothing passes the log is as loud as the bench.
 #[test]
 fn behind_a_low_pass_what_passes_counts() {
     let filter = Filter::new(&[1.0, 2.0, 1.0], &[1.0, -1.142_980_502_539_901_1, 0.412_801_598_096_188_77]).unwrap();

@@ -33,8 +33,9 @@ fn of(model: &[Term], log: &Log) -> AxisInflation {
     inflation(&params(model), log, FROM).unwrap().axes.remove(0)
 }
 
-/// 40 batches of 1024 samples, 90 % of their coefficients, half of a degree of freedom each: 0.51 % standard deviation of the factor, 0.92 % of the robust one; five of
-/// each. Between batches, and in them, the vehicle turns by some hundred times the noise.
+/// 40 batches of 1024 samples, 90 % of their coefficients, half of a degree of freedom each: 0.51 % standard
+/// deviation of the factor, 0.92 % of the robust one; five of each. Between batches, and in them, the vehicle turns
+/// by some hundred times the noise.
 #[test]
 fn batches_are_counted_together_under_motion() {
     for (run, factor) in [(0, 1.0), (1, 3.5)] {
@@ -52,7 +53,8 @@ fn batches_are_counted_together_under_motion() {
     }
 }
 
-/// 1000 logs of 8 batches of 300 samples: fewer than 914 or more than 986 covered with a probability of 1e-6, width and scatter known to 2.2 %, five of it.
+/// 1000 logs of 8 batches of 300 samples: fewer than 914 or more than 986 covered with a probability of 1e-6, width
+/// and scatter known to 2.2 %, five of it.
 #[test]
 fn the_intervals_cover() {
     let loud = params(&[Term::White { density: 0.2 }]);
@@ -62,8 +64,8 @@ fn the_intervals_cover() {
     check_intervals(&found, 914..=986, 0.11);
 }
 
-/// Neighbouring coefficients of a segment go together by its window. 3 of 1000 such logs of white noise show a line: five or more of 100 with a probability of 2e-5;
-/// 14 % would if every coefficient counted as one of its own.
+/// Neighbouring coefficients of a segment go together by its window. 3 of 1000 such logs of white noise show a line:
+/// five or more of 100 with a probability of 2e-5; 14 % would if every coefficient counted as one of its own.
 #[test]
 fn what_a_window_ties_together_is_no_line() {
     let with_lines =
@@ -72,7 +74,8 @@ fn what_a_window_ties_together_is_no_line() {
     assert!(found < 5, "{found}");
 }
 
-/// As for a log in one stretch: the power of 40 batches of 100 s at a correlation time of 50 s has some 80 independent values, 16 %; sigma 8 %, six of it.
+/// As for a log in one stretch: the power of 40 batches of 100 s at a correlation time of 50 s has some 80
+/// independent values, 16 %; sigma 8 %, six of it.
 #[test]
 fn a_line_is_found_in_batches() {
     let line = Term::Oscillation { std_dev: 0.5, frequency_hz: 2.0, correlation_time: 50.0 };
@@ -95,7 +98,8 @@ fn a_line_is_found_in_batches() {
     assert!((found.lines[0].std_dev / 0.125_f64.sqrt() - 1.0).abs() < 0.05, "{:?}", found.lines);
 }
 
-/// The longest length that keeps four fifths of what 256 samples would keep: of pieces of 1000, 1000, 900, 300 and 100 these are 2560; 1000 would keep 2000.
+/// The longest length that keeps four fifths of what 256 samples would keep: of pieces of 1000, 1000, 900, 300 and
+/// 100 these are 2560; 1000 would keep 2000.
 #[test]
 fn segments_are_as_long_as_they_keep_most_of_the_log() {
     let of_lengths = |lengths: &[usize]| {

@@ -1,4 +1,5 @@
-//! The walk that a program's filter is given: its price, what is done where no drift is known, and where in the file the numbers stand.
+//! The walk that a program's filter is given: its price, what is done where no drift is known, and where in the file
+//! the numbers stand.
 
 use kfdesign::noise::{NoiseModel, Term};
 use kfdesign::params::Params;
@@ -24,8 +25,9 @@ fn price(text: &str) -> [f64; 2] {
     [settled.max(start), field(&text.replace("# gyro", "gyro"), "least possible ")]
 }
 
-/// The default walk of every shipped sensor costs every consumer's filter at most 10 % of error and no other rule costs less; no value is clamped but
-/// one that is truly below its range, and a walk of more than 1.3 times the error is said on stderr, of every consumer.
+/// The default walk of every shipped sensor costs every consumer's filter at most 10 % of error and no other rule
+/// costs less; no value is clamped but one that is truly below its range, and a walk of more than 1.3 times the
+/// error is said on stderr, of every consumer.
 #[test]
 fn the_default_walk_costs_least() {
     let bench = Bench::new();
@@ -64,8 +66,9 @@ fn the_default_walk_costs_least() {
     );
 }
 
-/// A log in which no drift was found: a program with a default keeps it, one that needs a number gets the 95 % limit of `identify`, and without a limit
-/// the export is refused. 200 s of white noise end in one of these, never in a zero.
+/// A log in which no drift was found: a program with a default keeps it, one that needs a number gets the 95 % limit
+/// of `identify`, and without a limit the export is refused. 200 s of white noise end in one of these, never in a
+/// zero.
 #[test]
 fn no_drift_found_is_not_zero_drift() {
     let bench = Bench::new();
@@ -131,7 +134,8 @@ fn no_drift_found_is_not_zero_drift() {
     assert!(!bench.ok("export found.json --to px4").contains("EKF2_GYR_B_NOISE\t"));
 }
 
-/// At most ten lines of comment stand before the first value, of two sensors with flicker on three axes, measured inflation and factors.
+/// At most ten lines of comment stand before the first value, of two sensors with flicker on three axes, measured
+/// inflation and factors.
 #[test]
 fn the_numbers_are_at_the_top() {
     let bench = Bench::new();
@@ -155,8 +159,9 @@ fn the_numbers_are_at_the_top() {
     }
 }
 
-/// The one Gauss-Markov process of a simulator: with the white noise its Allan deviation is the sensor's within the factor that the file states, at
-/// averages from a sample to 10 000 s; for flicker no process does better by another time (a factor of two) or size (10 %).
+/// The one Gauss-Markov process of a simulator: with the white noise its Allan deviation is the sensor's within the
+/// factor that the file states, at averages from a sample to 10 000 s; for flicker no process does better by another
+/// time (a factor of two) or size (10 %).
 #[test]
 fn one_process_stands_for_flicker() {
     let bench = Bench::new();
@@ -182,8 +187,9 @@ fn one_process_stands_for_flicker() {
     }
 }
 
-/// The table of docs/export.md: for every shipped sensor and measured log the walk of three consumers, its price, the least possible one, the rules
-/// that were the default and the one offered before, and the +1/2 line of the Allan plot at 1000 s or a tenth of the log.
+/// The table of docs/export.md: for every shipped sensor and measured log the walk of three consumers, its price,
+/// the least possible one, the rules that were the default and the one offered before, and the +1/2 line of the
+/// Allan plot at 1000 s or a tenth of the log.
 #[test]
 #[ignore = "minutes: identifies every log at rest"]
 fn table_of_walks() {

@@ -15,8 +15,9 @@ const SIGMA: f64 = 0.3;
 const TIME: f64 = 0.25;
 const WALK: f64 = 0.05;
 
-/// (value, bias, variance of the bias) with C = N²/dt I + σ² e^(−|i−j| dt/Tc) + K² dt min(i, j), restricted likelihood with U = [1, t − t_mid]:
-/// −½ [n ln 2π + ln det C + zᵀ P z + ln det Uᵀ C⁻¹ U] (Harville 1974). `at`: steps from the start of the log.
+/// (value, bias, variance of the bias) with C = N²/dt I + σ² e^(−|i−j| dt/Tc) + K² dt min(i, j), restricted
+/// likelihood with U = [1, t − t_mid]: −½ [n ln 2π + ln det C + zᵀ P z + ln det Uᵀ C⁻¹ U] (Harville 1974). `at`:
+/// steps from the start of the log.
 fn by_the_book(at: &[usize], z: &[f64], slope: bool, [drift, walk]: [bool; 2]) -> (f64, f64, f64) {
     let n = at.len();
     let total = at.last().unwrap() + 1;
@@ -54,9 +55,9 @@ fn noise([drift, walk]: [bool; 2]) -> NoiseModel {
     NoiseModel { terms }
 }
 
-/// 700 samples, so that the filter settles (its slowest error mode is that of the constant the random walk has become, or of the
-/// Gauss-Markov process), a gap of 37 and another of one, a sample that is not a number: every sum is over less than a thousand terms of order one,
-/// so 1e-10 of ln L and 1e-9 of the bias are rounding.
+/// 700 samples, so that the filter settles (its slowest error mode is that of the constant the random walk has
+/// become, or of the Gauss-Markov process), a gap of 37 and another of one, a sample that is not a number: every sum
+/// is over less than a thousand terms of order one, so 1e-10 of ln L and 1e-9 of the bias are rounding.
 #[test]
 fn likelihood_is_that_of_the_normal_vector() {
     let kinds = [[true, false], [false, true], [true, true]];
@@ -78,8 +79,9 @@ fn likelihood_is_that_of_the_normal_vector() {
     }
 }
 
-/// A gap of 10¹⁵ samples costs no more than one of ten correlation times: what is before it says nothing of the drift behind it, so both give the
-/// same to 1e-4 of the variance that is left (e^−20 = 2e-9 of correlation, 700 samples).
+/// A gap of 10¹⁵ samples costs no more than one of ten correlation times: what is before it says nothing of the
+/// drift behind it, so both give the same to 1e-4 of the variance that is left (e^−20 = 2e-9 of correlation, 700
+/// samples).
 #[test]
 fn a_gap_of_years_is_one_step() {
     let model = sensor_errors(Quantity::AngularRate, &noise([true, false]), None, DT, 100.0).unwrap();
@@ -101,8 +103,8 @@ fn too_few_samples_have_no_likelihood() {
     assert!(of(&[1.0, 1.5], false).is_finite() && of(&[1.0, 1.5, 1.2], true).is_finite());
 }
 
-/// The same number step by step: one filter for the log, one for each regressor, every covariance carried to the end, least squares after. `prior`:
-/// mean and variance of the bias.
+/// The same number step by step: one filter for the log, one for each regressor, every covariance carried to the
+/// end, least squares after. `prior`: mean and variance of the bias.
 fn step_by_step(model: &LinearModel, log: &[Stretch], slope: bool, prior: Option<[f64; 2]>) -> LogLikelihood {
     let total: u64 = log.iter().map(|part| part.missing + part.samples.len() as u64).sum();
     let middle = 0.5 * (total as f64 - 1.0);
@@ -140,7 +142,8 @@ fn step_by_step(model: &LinearModel, log: &[Stretch], slope: bool, prior: Option
     LogLikelihood { value: -0.5 * value, bias: mean + best[0], bias_variance: inverse[(0, 0)] }
 }
 
-/// Models of one to nine states, F diagonal and not, each with 11 neighbours that differ: two turns through the log, the second not full.
+/// Models of one to nine states, F diagonal and not, each with 11 neighbours that differ: two turns through the log,
+/// the second not full.
 fn families() -> Vec<Vec<LinearModel>> {
     let white = |f: f64| Term::White { density: f * N };
     let drift = |f: f64, time: f64| Term::GaussMarkov { std_dev: f * SIGMA, correlation_time: time / f };
@@ -169,9 +172,9 @@ fn families() -> Vec<Vec<LinearModel>> {
     mixtures.iter().enumerate().map(family).collect()
 }
 
-/// 4000 samples, so that gains settle and the answer to the constant comes to rest, a gap, a sample that is not a number: |ln L| and the sums in it
-/// are below 1e5, so 1e-9 is rounding. A constant of ten thousand standard deviations, which is no part of the likelihood, rounds the
-/// samples to 1e-12 of those: 1e-6 after 4000 of them.
+/// 4000 samples, so that gains settle and the answer to the constant comes to rest, a gap, a sample that is not a
+/// number: |ln L| and the sums in it are below 1e5, so 1e-9 is rounding. A constant of ten thousand standard
+/// deviations, which is no part of the likelihood, rounds the samples to 1e-12 of those: 1e-6 after 4000 of them.
 #[test]
 fn models_side_by_side_are_those_one_by_one() {
     let value = |k: usize| 0.3 * (0.7 * k as f64).sin() + 0.3 * (0.013 * k as f64).cos();

@@ -1,4 +1,5 @@
-//! The exact expectation of a mismatched filter against identities, printed values, an explicit linear map and a simulation.
+//! The exact expectation of a mismatched filter against identities, printed values, an explicit linear map and a
+//! simulation.
 
 use kfdesign::filter::Kalman;
 use kfdesign::filter::gains::GainSequence;
@@ -114,8 +115,8 @@ fn a_true_filter_is_as_good_as_it_claims() {
     }
 }
 
-/// Mis-tuned filters on the reference sensor, in steady state: printed values, computed by an independent program from the Lyapunov equation.
-/// Tolerances are half of the last printed digit (one NEES lies on the border).
+/// Mis-tuned filters on the reference sensor, in steady state: printed values, computed by an independent program
+/// from the Lyapunov equation. Tolerances are half of the last printed digit (one NEES lies on the border).
 #[test]
 fn mistuned_filters_have_the_printed_nees_nis_and_bias_error() {
     let (sigma, tc, n, dt) = (0.0280596, 193.9312, 0.0562, 0.01);
@@ -150,8 +151,8 @@ fn mistuned_filters_have_the_printed_nees_nis_and_bias_error() {
     }
 }
 
-/// NumPy 2.4.6: every error, innovation and block sum written out as a linear map of all noises of the run, then squared with their
-/// covariance; no recursion of moments.
+/// NumPy 2.4.6: every error, innovation and block sum written out as a linear map of all noises of the run, then
+/// squared with their covariance; no recursion of moments.
 #[test]
 fn moments_are_those_of_the_explicit_linear_map() {
     let (filter, truth) = (two_rates(), another_world());
@@ -193,7 +194,8 @@ fn moments_are_those_of_the_explicit_linear_map() {
     close(second.blocks[1], 1.160943868759431);
 }
 
-/// A filter that believes in no drift at all lets every measurement through: E[(Σ y)²/L] = (r + σ² (1 + 2 Σ (1 − j/L) a^j))/R, closed form.
+/// A filter that believes in no drift at all lets every measurement through: E[(Σ y)²/L] = (r + σ² (1 + 2 Σ (1 −
+/// j/L) a^j))/R, closed form.
 #[test]
 fn blocks_of_a_blind_filter_are_those_of_the_drift_itself() {
     let (sigma, tc, n, dt) = (0.3, 20.0, 0.5, 1.0);
@@ -262,10 +264,11 @@ fn add(x: &mut DVector<f64>, l: &DMatrix<f64>, normal: &mut impl Iterator<Item =
     *x += l * n;
 }
 
-/// Wrong P0, wrong x0, a drift state left out, a second measurement every third step, judged by the output; 20 000 runs.
+/// Wrong P0, wrong x0, a drift state left out, a second measurement every third step, judged by the output; 20 000
+/// runs.
 ///
-/// 26 means are compared at 5.2 of their own standard errors: false alarm below 1e-4 in all, with room for the skewness of squares
-/// (Edgeworth's factor at 5.2 is below 2).
+/// 26 means are compared at 5.2 of their own standard errors: false alarm below 1e-4 in all, with room for the
+/// skewness of squares (Edgeworth's factor at 5.2 is below 2).
 #[test]
 fn a_simulation_agrees_while_the_gain_still_changes() {
     const RUNS: u64 = 20_000;

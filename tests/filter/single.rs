@@ -23,9 +23,10 @@ fn a_plain_filter_runs_in_single_precision() {
     assert!(single_precision(&bias_and_drift(), 2000, 3).unwrap().condition > 1.0);
 }
 
-/// Three nearly parallel measurements, from P = I: as they become more alike, the condition of P grows like 1/d². Up to 10⁵ every form in f32 claims what
-/// f64 does to 1 %; from 10⁸ on P - K h P and Joseph are off by more than 2 %, or lost; the square root holds 1 % throughout.
-/// (The same steps in NumPy's float32: 8e-4 at most at 7e4, from 8 % on at 2e8, and 6e-4 for the square root at 3e9.)
+/// Three nearly parallel measurements, from P = I: as they become more alike, the condition of P grows like 1/d². Up
+/// to 10⁵ every form in f32 claims what f64 does to 1 %; from 10⁸ on P - K h P and Joseph are off by more than 2 %,
+/// or lost; the square root holds 1 % throughout. (The same steps in NumPy's float32: 8e-4 at most at 7e4, from 8 %
+/// on at 2e8, and 6e-4 for the square root at 3e9.)
 #[test]
 fn the_condition_of_p_says_what_single_precision_holds() {
     let mut seen = [0, 0];

@@ -7,8 +7,8 @@ use nalgebra::{DMatrix, DVector};
 use super::square_root::{normals, two_measurements};
 use super::{bias_and_drift, drift};
 
-/// E[x_k | z] and its covariance for every k, from the joint covariance of all states and measurements (no recursion but x ← F x):
-/// with X the stacked states, Z = A X + w: E = μ + C Aᵀ (A C Aᵀ + R)⁻¹ (z − A μ).
+/// E[x_k | z] and its covariance for every k, from the joint covariance of all states and measurements (no recursion
+/// but x ← F x): with X the stacked states, Z = A X + w: E = μ + C Aᵀ (A C Aᵀ + R)⁻¹ (z − A μ).
 fn batch(m: &LinearModel, z: &[Vec<f64>], u: &[Vec<f64>]) -> (Vec<DVector<f64>>, Vec<DMatrix<f64>>) {
     let (n, samples) = (m.x0.len(), z[0].len());
     let mut mean = DVector::zeros(n * samples);
@@ -50,7 +50,8 @@ fn batch(m: &LinearModel, z: &[Vec<f64>], u: &[Vec<f64>]) -> (Vec<DVector<f64>>,
     (states, (0..samples).map(|k| p.view((k * n, k * n), (n, n)).into_owned()).collect())
 }
 
-/// 60 samples with holes, singular Q, an input, two rates: x to 1e-9 of its sigma, sigma to 1e-9; the last sample is the filtered one.
+/// 60 samples with holes, singular Q, an input, two rates: x to 1e-9 of its sigma, sigma to 1e-9; the last sample is
+/// the filtered one.
 #[test]
 fn equals_batch_least_squares() {
     let slow = drift(0.03, 40.0, 0.05, 1.0);

@@ -15,7 +15,8 @@ pub(super) fn normals(n: usize, seed: u64) -> Vec<f64> {
     (0..n).map(|_| StandardNormal.sample(&mut rng)).collect()
 }
 
-/// Position and velocity driven by white acceleration, position measured every sample, velocity every third; an input; F full.
+/// Position and velocity driven by white acceleration, position measured every sample, velocity every third; an
+/// input; F full.
 pub(super) fn two_measurements() -> LinearModel {
     let mut m = model(
         &[&[1.0, 0.5], &[-0.02, 0.9]],
@@ -34,7 +35,8 @@ pub(super) fn two_measurements() -> LinearModel {
     m
 }
 
-/// 3000 samples, some rejected, some without a measurement: x to 1e-10 of its sigma, P and every update to 1e-10 of themselves.
+/// 3000 samples, some rejected, some without a measurement: x to 1e-10 of its sigma, P and every update to 1e-10 of
+/// themselves.
 #[test]
 fn equals_the_joseph_form() {
     for m in [drift(0.03, 193.93, 0.0562, 0.01), bias_and_drift(), two_measurements()] {
@@ -78,8 +80,9 @@ fn equals_the_joseph_form() {
     }
 }
 
-/// Three nearly parallel measurements of σ = 1e-7 from P = I: the covariance in rational arithmetic (beside it the condition number is 1e15).
-/// The Joseph form, in double precision, is 4 to 56 % off in the variances; the square root keeps 1e-8.
+/// Three nearly parallel measurements of σ = 1e-7 from P = I: the covariance in rational arithmetic (beside it the
+/// condition number is 1e15). The Joseph form, in double precision, is 4 to 56 % off in the variances; the square
+/// root keeps 1e-8.
 #[test]
 fn keeps_a_covariance_that_the_joseph_form_has_lost() {
     let d = 1e-7;

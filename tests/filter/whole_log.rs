@@ -1,4 +1,5 @@
-//! The filter in two stages, whose gains settle, against the one that carries its whole covariance from sample to sample.
+//! The filter in two stages, whose gains settle, against the one that carries its whole covariance from sample to
+//! sample.
 
 use super::model;
 use kfdesign::filter::Kalman;
@@ -38,7 +39,8 @@ fn models() -> [LinearModel; 5] {
     ]
 }
 
-/// Samples of order one; 3000 of them, of which the first some hundred settle, with stretches that are not numbers, and one whose square is none.
+/// Samples of order one; 3000 of them, of which the first some hundred settle, with stretches that are not numbers,
+/// and one whose square is none.
 fn samples() -> Vec<f64> {
     let mut z = vec![0.0; 3000];
     fill_normal(&mut stream(5, StreamId { run: 0, axis: 0, term: 0 }), &mut z);
@@ -100,7 +102,8 @@ fn stages_and_steps_agree() {
     }
 }
 
-/// The unit of the log changes neither NIS nor the differences of ln L: the product of sixteen variances of 1e-50 would be zero.
+/// The unit of the log changes neither NIS nor the differences of ln L: the product of sixteen variances of 1e-50
+/// would be zero.
 #[test]
 fn any_unit_gives_the_same() {
     let scale = 1e-25;
@@ -123,7 +126,8 @@ fn any_unit_gives_the_same() {
     }
 }
 
-/// A gap is stepped over in as many steps as its length has binary digits, as the filter by the book does it: a few hundred roundings.
+/// A gap is stepped over in as many steps as its length has binary digits, as the filter by the book does it: a few
+/// hundred roundings.
 #[test]
 fn long_gaps_take_no_time() {
     for (number, model) in models().iter().enumerate() {
@@ -143,7 +147,8 @@ fn long_gaps_take_no_time() {
     }
 }
 
-/// Pieces of any length, with steps left out between them, end in the state and covariance of the filter that goes step by step.
+/// Pieces of any length, with steps left out between them, end in the state and covariance of the filter that goes
+/// step by step.
 #[test]
 fn pieces_and_gaps_end_in_the_same_state() {
     let z: Vec<f64> = samples().into_iter().filter(|z| z.abs() < 1e140).collect();

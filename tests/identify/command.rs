@@ -120,8 +120,8 @@ const PARAMS_OF_A_CLAIM: &str = r#"{ "format": "kfdesign-params/1", "quantity": 
     "bias": "0.6 deg/s", "white": { "density": "0.0562 deg/s/sqrt(Hz)" },
     "gauss_markov": [{ "std_dev": "0.028 deg/s", "correlation_time": "20 s" }] }] }"#;
 
-/// An hour of the reference sensor whose correlation time has a lower limit alone: `null` in the document, a dash in the table, the reason in words. The
-/// document is a design like any other, but for what needs both limits.
+/// An hour of the reference sensor whose correlation time has a lower limit alone: `null` in the document, a dash in
+/// the table, the reason in words. The document is a design like any other, but for what needs both limits.
 #[test]
 fn a_correlation_time_without_an_upper_limit_goes_through() {
     let bench = Bench::new();
@@ -153,8 +153,8 @@ fn a_correlation_time_without_an_upper_limit_goes_through() {
     assert_eq!(bench.files(), ["claims.json", "filter.json", "log.csv", "params.json", "r.html"]);
 }
 
-/// The measured industrial gyro whose white density is known from its Allan deviation at 1 s (deg/s/√Hz, computed independently),
-/// band-limited: within 10 %, and the band limit is said.
+/// The measured industrial gyro whose white density is known from its Allan deviation at 1 s (deg/s/√Hz, computed
+/// independently), band-limited: within 10 %, and the band limit is said.
 #[test]
 fn measured_gyro_has_its_known_density() {
     let Some(path) = measured("static/SMAC-Group_imudata/adis16405_recording1.csv.gz") else { return };
@@ -171,8 +171,10 @@ fn measured_gyro_has_its_known_density() {
     }
 }
 
-/// A log that moves from 100 s to 120 s of 200 s is identified, but that is a failed check: exit status 1, said in the document and by every later command, and nowhere "at rest". The part that
-/// is calm is named with the flags that leave it, and they give a log with which all is well. White noise of 1000 windows has a motion with a probability below 1e-6.
+/// A log that moves from 100 s to 120 s of 200 s is identified, but that is a failed check: exit status 1, said in
+/// the document and by every later command, and nowhere "at rest". The part that is calm is named with the flags
+/// that leave it, and they give a log with which all is well. White noise of 1000 windows has a motion with a
+/// probability below 1e-6.
 #[test]
 fn a_log_that_moves_is_a_failed_check_wherever_it_goes() {
     let bench = Bench::new();
@@ -218,7 +220,8 @@ fn a_log_that_moves_is_a_failed_check_wherever_it_goes() {
     assert!(bench.read("calm.m").contains("identified at rest"));
 }
 
-/// A fit that misses the data surely and by more than is tolerated: a model of white noise for a log of white noise and a line that has most of the power. And with the line in the model not.
+/// A fit that misses the data surely and by more than is tolerated: a model of white noise for a log of white noise
+/// and a line that has most of the power. And with the line in the model not.
 #[test]
 fn a_fit_that_misses_the_log_is_a_failed_check() {
     let bench = Bench::new();

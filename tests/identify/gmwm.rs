@@ -19,8 +19,8 @@ fn identify(rate: &[f64], dt: f64, choice: &ModelChoice) -> Identified {
     by(Method::Gmwm, rate, dt, choice)
 }
 
-/// White noise alone in closed form: with the weights at the fitted model, Σ e_j (ν̂²_j/ν²_j − 1) = 0, so that N² is the mean of the
-/// N_j² = σ²_A(τ_j) τ_j with the degrees of freedom e_j as weights; to where the search stops.
+/// White noise alone in closed form: with the weights at the fitted model, Σ e_j (ν̂²_j/ν²_j − 1) = 0, so that N² is
+/// the mean of the N_j² = σ²_A(τ_j) τ_j with the degrees of freedom e_j as weights; to where the search stops.
 #[test]
 fn weighted_mean_of_white_noise() {
     let (n, dt) = (5000, 0.02);
@@ -51,7 +51,8 @@ fn weighted_mean_of_white_noise() {
     assert!((ratio - 1.0).abs() < 1e-3, "{ratio}");
 }
 
-/// A minute tells nothing of a drift of minutes; what it asks for instead is a log that somebody could record, or none (before: up to 10¹² days).
+/// A minute tells nothing of a drift of minutes; what it asks for instead is a log that somebody could record, or
+/// none (before: up to 10¹² days).
 #[test]
 fn no_absurd_log_is_asked_for() {
     let (dt, forced) = (0.01, parse_model("white+gm").unwrap());
@@ -98,7 +99,8 @@ fn drifts(found: &Identified) -> Vec<[(f64, [f64; 2]); 2]> {
     found.params.terms.iter().filter_map(of).collect()
 }
 
-/// Two drifts, correlation times 5 s and 100 s, 2 h at 10 Hz: z of all five parameters below 5 (6e-7 each, were they normal).
+/// Two drifts, correlation times 5 s and 100 s, 2 h at 10 Hz: z of all five parameters below 5 (6e-7 each, were they
+/// normal).
 #[test]
 fn two_gauss_markov_processes_are_recovered() {
     let rate = log(&[white(0.01), gauss_markov(0.03, 5.0), gauss_markov(0.03, 100.0)], 72_000, 0.1, 33, 0);
@@ -119,7 +121,8 @@ fn two_gauss_markov_processes_are_recovered() {
     }
 }
 
-/// White noise of 8 seeds, 2 h. The study finds white alone in 393 of 400 logs: fewer than 5 of 8 happen with probability 7e-6.
+/// White noise of 8 seeds, 2 h. The study finds white alone in 393 of 400 logs: fewer than 5 of 8 happen with
+/// probability 7e-6.
 #[test]
 fn no_drift_is_invented() {
     let white_alone = |run: &u64| {
@@ -187,9 +190,10 @@ fn gmwm_study_of_model_choice() {
     }
 }
 
-/// Logs of the model that the authors of the method publish for the x gyroscope of an MTi-G at 100 Hz (course of the SMAC group, chapter 5:
-/// three first-order autoregressions from 19 scales; 873,684 samples are assumed): our estimates of the two slow ones beside the published standard errors.
-/// The fast one (phi = 0.1256) is white noise to us: averages of less than some samples are left out.
+/// Logs of the model that the authors of the method publish for the x gyroscope of an MTi-G at 100 Hz (course of the
+/// SMAC group, chapter 5: three first-order autoregressions from 19 scales; 873,684 samples are assumed): our
+/// estimates of the two slow ones beside the published standard errors. The fast one (phi = 0.1256) is white noise
+/// to us: averages of less than some samples are left out.
 #[test]
 #[ignore = "a study of minutes that prints figures, not a check"]
 fn gmwm_study_of_a_published_example() {

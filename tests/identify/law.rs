@@ -81,7 +81,8 @@ fn white(found: &Identified) -> [f64; 3] {
     found.params.terms.iter().find_map(of).unwrap()
 }
 
-/// Share of intervals that hold the truth, mean error of ln N, its standard deviation, and that which the intervals claim.
+/// Share of intervals that hold the truth, mean error of ln N, its standard deviation, and that which the intervals
+/// claim.
 fn scatter(law: Law, robust: bool, samples: usize, runs: u64) -> [f64; 4] {
     let truth = N * law.variances()[usize::from(robust)].sqrt();
     let one = |run: u64| {
@@ -95,9 +96,10 @@ fn scatter(law: Law, robust: bool, samples: usize, runs: u64) -> [f64; 4] {
     [mean(0), bias, sd, mean(2)]
 }
 
-/// Logs of 10,000 samples, 40 of each law. A true interval misses 2 of 40 (of t4 without --robust 3): 11 and more by chance in fewer than one in 2000 of these eight rows together but
-/// for that one (5e-4), and the mean error is within 4.5 of its standard errors (8 rows: 6e-5). Intervals of normal noise alone miss 20 of t4; without its tails put back N of t4 is 5 % too
-/// small with --robust.
+/// Logs of 10,000 samples, 40 of each law. A true interval misses 2 of 40 (of t4 without --robust 3): 11 and more by
+/// chance in fewer than one in 2000 of these eight rows together but for that one (5e-4), and the mean error is
+/// within 4.5 of its standard errors (8 rows: 6e-5). Intervals of normal noise alone miss 20 of t4; without its
+/// tails put back N of t4 is 5 % too small with --robust.
 #[test]
 fn intervals_of_n_hold_it_whatever_the_law() {
     for law in [Law::Normal, Law::Student(4.0), Law::Student(8.0), Law::Outliers] {
@@ -116,7 +118,8 @@ fn intervals_of_n_hold_it_whatever_the_law() {
     }
 }
 
-/// The other methods know the kurtosis, too: with that of t4 their intervals of N are wider than those of normal noise, as much as those of the likelihood.
+/// The other methods know the kurtosis, too: with that of t4 their intervals of N are wider than those of normal
+/// noise, as much as those of the likelihood.
 #[test]
 fn every_method_knows_the_kurtosis() {
     let (unit, choice) = (Unit::parse("rad/s").unwrap(), parse_model("white+gm").unwrap());
@@ -177,8 +180,9 @@ fn spread(tau: f64, run: u64) -> Vec<f64> {
     (0..6).map(|_| N * (tau * normal(&mut rng)).exp()).collect()
 }
 
-/// Groups of six logs of 3000 samples. Alike, one group of a hundred is said to differ: four of 40 in 1e-3 of all such tests. With N that differs by 20 % all are, N is named and nothing
-/// else more often than by chance, and its interval holds the middle of the densities in 95 %: fewer than 27 of 40 in 1e-6.
+/// Groups of six logs of 3000 samples. Alike, one group of a hundred is said to differ: four of 40 in 1e-3 of all
+/// such tests. With N that differs by 20 % all are, N is named and nothing else more often than by chance, and its
+/// interval holds the middle of the densities in 95 %: fewer than 27 of 40 in 1e-6.
 #[test]
 fn logs_that_differ_are_told_and_no_others() {
     let differ = |found: &Identified| {

@@ -38,8 +38,9 @@ fn ln_estimate(found: &Identified) -> Option<[f64; 4]> {
     (n + sigma + tc).is_finite().then_some([n, sigma, tc, sigma + 0.5 * (2.0_f64.ln() - tc)])
 }
 
-/// Bound of the standard deviation of ln N, ln σ, ln Tc, ln q_c from n samples of white noise + Gauss-Markov:
-/// I_ij = (n/2π) ∫₀^π ∂_i ln S ∂_j ln S dω, S = N²/dt + σ²(1 − φ²)/((1 − φ)² + 4φ sin²(ω/2)) (Whittle 1953), in closed derivatives.
+/// Bound of the standard deviation of ln N, ln σ, ln Tc, ln q_c from n samples of white noise + Gauss-Markov: I_ij =
+/// (n/2π) ∫₀^π ∂_i ln S ∂_j ln S dω, S = N²/dt + σ²(1 − φ²)/((1 − φ)² + 4φ sin²(ω/2)) (Whittle 1953), in closed
+/// derivatives.
 pub(super) fn bound(n: f64, sigma: f64, tc: f64, samples: usize, dt: f64) -> [f64; 4] {
     let phi = (-dt / tc).exp();
     let by_tc = phi * dt / tc;
@@ -68,7 +69,8 @@ pub(super) fn bound(n: f64, sigma: f64, tc: f64, samples: usize, dt: f64) -> [f6
 // Known truth
 // ---------------------------------------------------------------------------------------------------------------
 
-/// Relative standard deviations of the reference set at 1 Hz, 2 h, as an independent computation gives them: within a digit of the last place.
+/// Relative standard deviations of the reference set at 1 Hz, 2 h, as an independent computation gives them: within
+/// a digit of the last place.
 #[test]
 fn bound_of_the_reference_sensor() {
     let found = bound(N, SIGMA, TC, 7200, 1.0);
@@ -78,9 +80,10 @@ fn bound_of_the_reference_sensor() {
     }
 }
 
-/// Ten hours at 1 Hz: each of ln N, ln σ, ln Tc within 4 standard deviations of the bound (2e-4 for the three), the printed bound equal to
-/// the formula at the estimate (the sum begins half a coefficient later than the integral: with T = 186 Tc, 2 % of the widest), and the curvature
-/// within 30 % of the expected one (its relative scatter is of the order of the bound of ln Tc, 0.13: with the chain of both 1e-4).
+/// Ten hours at 1 Hz: each of ln N, ln σ, ln Tc within 4 standard deviations of the bound (2e-4 for the three), the
+/// printed bound equal to the formula at the estimate (the sum begins half a coefficient later than the integral:
+/// with T = 186 Tc, 2 % of the widest), and the curvature within 30 % of the expected one (its relative scatter is
+/// of the order of the bound of ln Tc, 0.13: with the chain of both 1e-4).
 #[test]
 fn reference_sensor_is_recovered_within_the_bound() {
     let samples = 36_000;
@@ -130,7 +133,8 @@ fn likelihood_of_white_noise_in_closed_form() {
     assert!((known.std_dev_percent / known.cramer_rao_percent - 1.0).abs() < 1e-3, "{known:?}");
 }
 
-/// Random walk and ramp, forced: z below 5 from the written interval (6e-7 each; the walk at 2 h is known to a few percent, near enough normal).
+/// Random walk and ramp, forced: z below 5 from the written interval (6e-7 each; the walk at 2 h is known to a few
+/// percent, near enough normal).
 #[test]
 fn random_walk_and_ramp_are_recovered() {
     let sigmas = |value: f64, truth: f64, [low, high]: [f64; 2]| (value - truth) / ((high - low) / (2.0 * 1.96));
@@ -157,7 +161,8 @@ fn random_walk_and_ramp_are_recovered() {
     }
 }
 
-/// A vibration line of 20 Hz, found by itself: frequency, size and width each within 4 standard deviations as written (2e-4 for the three).
+/// A vibration line of 20 Hz, found by itself: frequency, size and width each within 4 standard deviations as
+/// written (2e-4 for the three).
 #[test]
 fn line_is_recovered() {
     let truth = [0.05_f64, 20.0, 10.0];
@@ -190,7 +195,8 @@ fn line_is_recovered() {
 // Nothing invented
 // ---------------------------------------------------------------------------------------------------------------
 
-/// White noise of 8 seeds. The study finds white alone in 98.6 % of 1000 logs: fewer than 5 of 8 happen with probability 3e-6.
+/// White noise of 8 seeds. The study finds white alone in 98.6 % of 1000 logs: fewer than 5 of 8 happen with
+/// probability 3e-6.
 #[test]
 fn no_drift_is_invented() {
     let mut right = 0;
@@ -206,8 +212,8 @@ fn no_drift_is_invented() {
     assert!(right >= 5, "{right} of 8");
 }
 
-/// Five minutes of a sensor with a correlation time of three: what is written of Tc is one-sided and true (2.5 % in general, with this
-/// seed it is what it is).
+/// Five minutes of a sensor with a correlation time of three: what is written of Tc is one-sided and true (2.5 % in
+/// general, with this seed it is what it is).
 #[test]
 fn short_log_says_what_it_cannot_tell() {
     let rate = log(&[white(N), gauss_markov(SIGMA, TC)], 3000, 0.1, 27, 0);
@@ -273,8 +279,9 @@ fn what_says_nothing_is_refused() {
     assert_eq!(quiet.to_string(), "x: no line stands out of the spectrum: leave osc out of `model`");
 }
 
-/// A Gauss-Markov process that forgets within a sample or two: the log sets no lower limit to its time, and the filter needs it all the same. The variance
-/// of a sample under what is written is that of the log (known to √(2·1.6/n) = 0.9 %, bound 5 %).
+/// A Gauss-Markov process that forgets within a sample or two: the log sets no lower limit to its time, and the
+/// filter needs it all the same. The variance of a sample under what is written is that of the log (known to
+/// √(2·1.6/n) = 0.9 %, bound 5 %).
 #[test]
 fn fast_gauss_markov_process_is_written() {
     let (n, dt) = (40_000, 0.01);

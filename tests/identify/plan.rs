@@ -32,8 +32,9 @@ fn index(planned: &Planned, name: &str) -> usize {
     planned.names().position(|n| n == name).unwrap_or_else(|| panic!("no {name}"))
 }
 
-/// The printed bound of white noise + Gauss-Markov, N at 100 Hz and at 1 Hz, σ, Tc, q_c: an integral over frequencies, of which the sum has half a
-/// coefficient less at the lowest end. That costs 1.1 Tc/T of itself at most; besides, half a unit of the last printed digit.
+/// The printed bound of white noise + Gauss-Markov, N at 100 Hz and at 1 Hz, σ, Tc, q_c: an integral over
+/// frequencies, of which the sum has half a coefficient less at the lowest end. That costs 1.1 Tc/T of itself at
+/// most; besides, half a unit of the last printed digit.
 #[test]
 fn table_of_the_reference_sensor() {
     const TABLE: [(f64, [f64; 5], [f64; 5]); 5] = [
@@ -57,9 +58,10 @@ fn table_of_the_reference_sensor() {
     }
 }
 
-/// The exact Gaussian information of n samples of unknown mean, ½ tr(P ∂_i C P ∂_k C), P = C⁻¹ − C⁻¹1 1ᵀC⁻¹/(1ᵀC⁻¹1): the bound of the cosine
-/// coefficients is below by about 0.8 Tc/T, as they are not quite independent (a separate computation in NumPy: 0.096, 0.510, 0.801 Tc/T of N, σ, Tc
-/// at 2 h, 0.207, 0.454, 0.933 at 4 h, where 360 samples are coarse).
+/// The exact Gaussian information of n samples of unknown mean, ½ tr(P ∂_i C P ∂_k C), P = C⁻¹ − C⁻¹1
+/// 1ᵀC⁻¹/(1ᵀC⁻¹1): the bound of the cosine coefficients is below by about 0.8 Tc/T, as they are not quite
+/// independent (a separate computation in NumPy: 0.096, 0.510, 0.801 Tc/T of N, σ, Tc at 2 h, 0.207, 0.454, 0.933 at
+/// 4 h, where 360 samples are coarse).
 #[test]
 fn exact_gaussian_information() {
     let n = 360;
@@ -95,8 +97,8 @@ fn exact_gaussian_information() {
     }
 }
 
-/// Seven processes against every coefficient alone and derivatives by differences: 0.5 % of what the 2.5 % wide bins may miss (1e-4 for
-/// smooth spectra, more for the line, where they are a quarter of the distance to it).
+/// Seven processes against every coefficient alone and derivatives by differences: 0.5 % of what the 2.5 % wide bins
+/// may miss (1e-4 for smooth spectra, more for the line, where they are a quarter of the distance to it).
 #[test]
 fn bins_miss_little_of_the_exact_sum() {
     let (samples, rate) = (40_000, 10.0);
@@ -163,7 +165,8 @@ fn bins_miss_little_of_the_exact_sum() {
     assert!((ratio - 1.0).abs() < 5e-3, "driving noise: {ratio}");
 }
 
-/// White noise: 1/√(2(n − 1)), and a ramp in it: N √(12/(n(n² − 1) dt³)) of a slope; the bins cost the ramp less than 1e-3.
+/// White noise: 1/√(2(n − 1)), and a ramp in it: N √(12/(n(n² − 1) dt³)) of a slope; the bins cost the ramp less
+/// than 1e-3.
 #[test]
 fn white_noise_and_ramp_in_closed_form() {
     let planned = planned(&[white(N), Term::RateRamp { slope: -2e-5 }]);
@@ -178,8 +181,8 @@ fn white_noise_and_ramp_in_closed_form() {
     assert_eq!(planned.duration(0, 0.01, &own(2.0)), Some(2500.5));
 }
 
-/// Drift behind a filter of a few samples is told nearly as well as in white noise of the same density (2 % less of the driving noise, which shares the most with N); the
-/// white floor that goes with the filter is no parameter.
+/// Drift behind a filter of a few samples is told nearly as well as in white noise of the same density (2 % less of
+/// the driving noise, which shares the most with N); the white floor that goes with the filter is no parameter.
 #[test]
 fn beside_a_band_limit() {
     let filter = Filter::new(&[1.0, 0.3], &[1.0, -0.2]).unwrap();
@@ -202,8 +205,10 @@ fn beside_a_band_limit() {
     assert!(ratio > 1.0 && ratio < 3.0, "{ratio}");
 }
 
-/// What `identify` will know of a low-passed sensor, whose filter it has to find, is what is planned: the bound beside its estimate, to 5 % (that is of the filter that was found). With white
-/// noise that is no more than a floor there is something to be told at slow rates too, where the shape is not seen: drift as well as beside white noise.
+/// What `identify` will know of a low-passed sensor, whose filter it has to find, is what is planned: the bound
+/// beside its estimate, to 5 % (that is of the filter that was found). With white noise that is no more than a floor
+/// there is something to be told at slow rates too, where the shape is not seen: drift as well as beside white
+/// noise.
 #[test]
 fn a_low_passed_sensor_is_planned_as_it_will_be_found() {
     let params = Params::read(&data("low_pass/sensor.json")).unwrap();
@@ -296,7 +301,8 @@ fn command() {
     assert!(said.stdout.contains("no log is long enough; ten years at 100.0 Hz give 0.1"), "{}", said.stdout);
 }
 
-/// A band limit belongs to its sample rate: another rate is told, on stderr, and no row of ten times the rate is made of it; continuous terms are told nothing.
+/// A band limit belongs to its sample rate: another rate is told, on stderr, and no row of ten times the rate is
+/// made of it; continuous terms are told nothing.
 #[test]
 fn another_rate_moves_a_filter_and_is_told() {
     let bench = Bench::new();

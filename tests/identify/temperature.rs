@@ -1,4 +1,5 @@
-//! The regression on temperature: against the normal density written out, against known truth, and what the command makes of every kind of column.
+//! The regression on temperature: against the normal density written out, against known truth, and what the command
+//! makes of every kind of column.
 
 use kfdesign::filter::likelihood::Stretch;
 use kfdesign::identify::identify_logs;
@@ -43,8 +44,8 @@ fn alone(
     (found, effect)
 }
 
-/// ln L of the samples with a flat prior on the mean, k and its standard deviation: (value at k, value at 0, k, sigma), from the covariance
-/// N² I + σ² e^(−|i−j|/Tc) itself (Harville 1974). `at`: seconds.
+/// ln L of the samples with a flat prior on the mean, k and its standard deviation: (value at k, value at 0, k,
+/// sigma), from the covariance N² I + σ² e^(−|i−j|/Tc) itself (Harville 1974). `at`: seconds.
 fn by_the_book([density, std_dev, time]: [f64; 3], at: &[usize], z: &[f64], t: &[f64]) -> [f64; 4] {
     let n = at.len();
     let covariance = DMatrix::from_fn(n, n, |i, j| {
@@ -71,8 +72,9 @@ fn side(effect: &Effect, with: bool) -> [f64; 3] {
     [0, 1, 2].map(|i| if with { effect.parameters[i].with.si() } else { effect.parameters[i].without.si() })
 }
 
-/// Two logs, one with a gap and a sample that is not a number: k, its standard deviation and the likelihood ratio are those of the covariances written out
-/// (rounding: sums of 500 terms of order one, a difference of two ln L of 600: 1e-8), and the likelihood is at its maximum there.
+/// Two logs, one with a gap and a sample that is not a number: k, its standard deviation and the likelihood ratio
+/// are those of the covariances written out (rounding: sums of 500 terms of order one, a difference of two ln L of
+/// 600: 1e-8), and the likelihood is at its maximum there.
 #[test]
 fn regression_is_generalised_least_squares() {
     let (first, second) = (500, 300);
@@ -130,14 +132,16 @@ fn regression_is_generalised_least_squares() {
         }
     }
     assert!((effect.coefficient - 0.02).abs() < 5.0 * effect.sigma);
-    // of both logs, not of the one on whose coefficients its shape is found: wider than 1.96 to either side, for 300 samples do not know the noise well
+    // of both logs, not of the one on whose coefficients its shape is found: wider than 1.96 to either side, for 300
+    // samples do not know the noise well
     let sides = effect.interval.map(|end| (end - effect.coefficient).abs() / effect.sigma);
     assert!(sides.iter().all(|side| (1.96..3.2).contains(side)), "{sides:?}");
     assert_eq!(effect.parameters[3].parameter, "turn_on_bias.std_dev");
 }
 
-/// Four starts of the same course: the shape of the interval is found on one of them, which knows half as much of k, its width is that of all. White noise alone is known so well that it is 1.96 standard
-/// deviations (the ends are found to 0.02, 600 samples of noise add 0.005).
+/// Four starts of the same course: the shape of the interval is found on one of them, which knows half as much of k,
+/// its width is that of all. White noise alone is known so well that it is 1.96 standard deviations (the ends are
+/// found to 0.02, 600 samples of noise add 0.005).
 #[test]
 fn interval_is_that_of_all_logs() {
     let z: Vec<Vec<f64>> = (0..4).map(|run| log(&[white(0.2)], 600, 1.0, 97, run)).collect();
@@ -165,8 +169,9 @@ fn counted(runs: u64) -> [u64; 2] {
     (0..runs).map(one).fold([0, 0], |[a, b], [c, d]| [a + c, b + d])
 }
 
-/// The interval covers, and p is what it says, for a Gauss-Markov process of which the log has 20 correlation times: measured 95 % and 6 % (docs/validation.md).
-/// Of 60 logs fewer than 45 cover (93 % taken), or more than 14 are below 5 % (6 % taken), with a chance of below 3e-6 each (binomial).
+/// The interval covers, and p is what it says, for a Gauss-Markov process of which the log has 20 correlation times:
+/// measured 95 % and 6 % (docs/validation.md). Of 60 logs fewer than 45 cover (93 % taken), or more than 14 are
+/// below 5 % (6 % taken), with a chance of below 3e-6 each (binomial).
 #[test]
 fn known_coefficient_is_in_its_interval() {
     let [covered, false_alarms] = counted(60);
@@ -179,8 +184,9 @@ fn temperature_study() {
     println!("covered, false alarms of {}: {:?}", study_runs(), counted(study_runs()));
 }
 
-/// A random walk that a rising temperature may take the place of, though k is zero. Zero is in the interval where p says that it may be: both are of the same likelihood, on the cosine
-/// coefficients and exact, which differ by less than from 0.03 to 0.08 in p.
+/// A random walk that a rising temperature may take the place of, though k is zero. Zero is in the interval where p
+/// says that it may be: both are of the same likelihood, on the cosine coefficients and exact, which differ by less
+/// than from 0.03 to 0.08 in p.
 #[test]
 fn interval_and_p_value_say_the_same() {
     let [mut inside, mut outside, mut replaced] = [0; 3];
@@ -210,7 +216,8 @@ fn interval_and_p_value_say_the_same() {
     assert!(inside >= 20 && outside >= 3 && replaced >= 3, "{inside} {outside} {replaced}");
 }
 
-/// All drift of the log is that of the temperature: with the regression nothing is left of it, and its limit is below what was there.
+/// All drift of the log is that of the temperature: with the regression nothing is left of it, and its limit is
+/// below what was there.
 #[test]
 fn drift_of_the_temperature_goes_away() {
     let mut z = log(&[white(N)], 6000, 1.0, 93, 0);
@@ -229,8 +236,10 @@ fn drift_of_the_temperature_goes_away() {
     assert!(found.params.terms.len() == 2 || !found.params.not_identified.is_empty());
 }
 
-/// A temperature with noise of its own: averaging keeps k, and what noise is left is told. The reliability, 1 − q(noise)/q(T), is that of the same quantities computed with the true
-/// temperature, to 0.3 of what is missing to one (the noise energy of 3600 s, of which averages of 11 s leave 330 values, is known to 1/√165 = 8 %, three of them).
+/// A temperature with noise of its own: averaging keeps k, and what noise is left is told. The reliability, 1 −
+/// q(noise)/q(T), is that of the same quantities computed with the true temperature, to 0.3 of what is missing to
+/// one (the noise energy of 3600 s, of which averages of 11 s leave 330 values, is known to 1/√165 = 8 %, three of
+/// them).
 #[test]
 fn noise_of_the_temperature_is_told() {
     let samples = 3600;
@@ -340,7 +349,8 @@ fn columns_and_units() {
     assert_eq!(found["column"], "gyro_temp");
     assert!((found["missing"].as_f64().unwrap() - 1.0 / 3.0).abs() < 1e-9);
     assert!((value(&document) / value(&celsius) - 1.0).abs() < 0.01);
-    // every fiftieth sample not a number, two rows of a hundred missing: the temperature stands beside what is filled in
+    // every fiftieth sample not a number, two rows of a hundred missing: the temperature stands beside what is
+    // filled in
     let rows: String = log(&[white(N)], 3000, 1.0, 97, 0)
         .iter()
         .enumerate()

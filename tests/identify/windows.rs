@@ -36,8 +36,9 @@ fn values(found: &NoiseModel) -> [f64; 3] {
     }
 }
 
-/// The same windows four times over have the same maximum, and standard deviations half as large: ln L is four times that of once. 81 times: so
-/// many windows are held in groups. The search ends within 1e-4 standard deviations, which is below 1e-5 of the parameters here.
+/// The same windows four times over have the same maximum, and standard deviations half as large: ln L is four times
+/// that of once. 81 times: so many windows are held in groups. The search ends within 1e-4 standard deviations,
+/// which is below 1e-5 of the parameters here.
 #[test]
 fn the_same_windows_again_and_again() {
     let rate = log(&truth().terms, 20_000, DT, 3, 0);
@@ -56,9 +57,9 @@ fn the_same_windows_again_and_again() {
     }
 }
 
-/// 60 logs of five windows, each a hundred correlation times long: N, sigma and Tc are off by as much as is said. Mean within 4 standard deviations
-/// of the mean of 60 and 0.2 (half of what the means of the windows take away of the drift), mean square of (ln θ̂ − ln θ)/σ within
-/// 4 × √(2/60) of 1: six figures, false alarms 4e-4.
+/// 60 logs of five windows, each a hundred correlation times long: N, sigma and Tc are off by as much as is said.
+/// Mean within 4 standard deviations of the mean of 60 and 0.2 (half of what the means of the windows take away of
+/// the drift), mean square of (ln θ̂ − ln θ)/σ within 4 × √(2/60) of 1: six figures, false alarms 4e-4.
 #[test]
 fn windows_recover_the_truth() {
     let mut sums = [[0.0; 2]; 3];
@@ -77,7 +78,8 @@ fn windows_recover_the_truth() {
     }
 }
 
-/// From a start that is off by factors of three to ten: ln L is that of the filter there, its slopes vanish, and `identify` ends at the same place.
+/// From a start that is off by factors of three to ten: ln L is that of the filter there, its slopes vanish, and
+/// `identify` ends at the same place.
 #[test]
 fn maximum_alone() {
     let rate = log(&truth().terms, 30_000, DT, 7, 0);

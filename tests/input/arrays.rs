@@ -1,4 +1,5 @@
-//! MATLAB and HDF5 files: small ones written by SciPy 1.17.1 and h5py 3.16.0 (`written/write.py` says what is in them), and measured ones.
+//! MATLAB and HDF5 files: small ones written by SciPy 1.17.1 and h5py 3.16.0 (`written/write.py` says what is in
+//! them), and measured ones.
 
 use super::measured::Independent;
 use super::{Flags, assert_close, damage, read_bytes, shown};

@@ -49,8 +49,8 @@ impl Dataflash {
     }
 }
 
-/// Two batches of a gyro at 1 kHz with one of the accelerometer between them, and one of a second gyro. Of the second gyro batch the
-/// second message is lost, and there is one message that belongs to no batch.
+/// Two batches of a gyro at 1 kHz with one of the accelerometer between them, and one of a second gyro. Of the
+/// second gyro batch the second message is lost, and there is one message that belongs to no batch.
 fn log() -> Vec<u8> {
     let mut log = Dataflash::new();
     log.data(6, 3, 0);

@@ -9,8 +9,8 @@ pub fn cuts(bytes: &[u8]) -> impl Iterator<Item = Vec<u8>> {
     (0..100).map(|percent| bytes[..bytes.len() * percent / 100].to_vec())
 }
 
-/// The file with up to eight bytes changed, `count` times with a fixed seed; half of the changes are near the beginning, where the
-/// structure is.
+/// The file with up to eight bytes changed, `count` times with a fixed seed; half of the changes are near the
+/// beginning, where the structure is.
 pub fn changed(bytes: &[u8], count: u64) -> impl Iterator<Item = Vec<u8>> {
     let mut state = 0x9e37_79b9_7f4a_7c15u64;
     let mut draw = move || {
@@ -30,7 +30,8 @@ pub fn changed(bytes: &[u8], count: u64) -> impl Iterator<Item = Vec<u8>> {
     })
 }
 
-/// Reads [`cuts`] and [`changed`]. Returns the longest time for one file. A panic or an abort fails the test, and so does a minute for one file.
+/// Reads [`cuts`] and [`changed`]. Returns the longest time for one file. A panic or an abort fails the test, and so
+/// does a minute for one file.
 pub fn survives(name: &str, bytes: &[u8], flags: &[Flags], count: u64) -> Duration {
     let mut slowest = Duration::ZERO;
     for damaged in cuts(bytes).chain(changed(bytes, count)) {

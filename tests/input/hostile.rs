@@ -1,5 +1,6 @@
-//! Files made on purpose: a few kB that declare, lead to or unpack to far more. Each is refused in one line or read, within the memory that
-//! docs/formats.md promises; each ended in an abort, gigabytes or minutes in the readers before there was one account.
+//! Files made on purpose: a few kB that declare, lead to or unpack to far more. Each is refused in one line or read,
+//! within the memory that docs/formats.md promises; each ended in an abort, gigabytes or minutes in the readers
+//! before there was one account.
 
 use std::io::Write;
 

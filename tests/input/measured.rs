@@ -1,4 +1,5 @@
-//! Measured logs: counts, rates, first and last values and means as an independent reader gives them, and known defects.
+//! Measured logs: counts, rates, first and last values and means as an independent reader gives them, and known
+//! defects.
 
 use kfdesign::input::{self, Block, LogReader};
 use kfdesign::signal::check::{FindingKind, TimeBase};
@@ -352,7 +353,8 @@ fn measured_logs_that_are_refused_say_why() {
     }
 }
 
-/// What an independent reader says of a file: samples, mean rate, first stamp, and first and last value and mean per axis.
+/// What an independent reader says of a file: samples, mean rate, first stamp, and first and last value and mean per
+/// axis.
 pub struct Independent {
     pub path: &'static str,
     pub start_s: f64,

@@ -1,4 +1,5 @@
-//! Memory of a process that reads a file, intact or damaged: under a limit set by the system, of which any excess ends it.
+//! Memory of a process that reads a file, intact or damaged: under a limit set by the system, of which any excess
+//! ends it.
 
 use std::process::Command;
 use std::time::{Duration, Instant};
@@ -9,12 +10,12 @@ use super::super::support::{Bench, measured};
 use super::damage::{changed, cuts};
 use super::messages::SAMPLES;
 
-/// Beyond four times the file, in KiB: twice what the most demanding file takes. Most is the window of a Zstandard block, 8 MiB, and stacks; a process that
-/// reads next to nothing has 2.7 MiB.
+/// Beyond four times the file, in KiB: twice what the most demanding file takes. Most is the window of a Zstandard
+/// block, 8 MiB, and stacks; a process that reads next to nothing has 2.7 MiB.
 const ROOM: u64 = 16 << 10;
 
-/// Status, stderr and stdout of a command and its flags with a file of so many bytes, within the memory that is promised for it. Data of the
-/// process, stacks included, are limited by `ulimit -d`.
+/// Status, stderr and stdout of a command and its flags with a file of so many bytes, within the memory that is
+/// promised for it. Data of the process, stacks included, are limited by `ulimit -d`.
 pub fn within(path: &std::path::Path, command: &[&str], bytes: usize) -> (Option<i32>, String, String) {
     let limit = 4 * (bytes as u64).div_ceil(1024) + ROOM;
     let bench = Bench::new();

@@ -7,7 +7,8 @@ use super::super::support::measured;
 use super::measured::Independent;
 use super::{Flags, damage, options};
 
-/// By pyulog 1.3.0, pymavlink 2.4.50, rosbags 0.11.9 (bags; the database through Python's sqlite3) and mcap 1.6.0 with rosbags for the messages; means by NumPy 2.4.6.
+/// By pyulog 1.3.0, pymavlink 2.4.50, rosbags 0.11.9 (bags; the database through Python's sqlite3) and mcap 1.6.0
+/// with rosbags for the messages; means by NumPy 2.4.6.
 #[test]
 fn measured_files_agree_with_independent_readers() {
     let files = [
@@ -310,8 +311,9 @@ fn damaged_files_end() {
     }
 }
 
-/// `cargo test --release -- --ignored --nocapture ten_thousand_changes`: 10,000 changes of each sample file, whole but for those that take
-/// long to unpack, and the most memory that the process held. `KFDESIGN_SAMPLE` picks one by a part of its name.
+/// `cargo test --release -- --ignored --nocapture ten_thousand_changes`: 10,000 changes of each sample file, whole
+/// but for those that take long to unpack, and the most memory that the process held. `KFDESIGN_SAMPLE` picks one by
+/// a part of its name.
 #[test]
 #[ignore = "takes an hour"]
 fn ten_thousand_changes() {

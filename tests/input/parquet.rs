@@ -1,4 +1,5 @@
-//! Parquet files: small ones written by pyarrow 26.0.1, polars 2.1.0 and fastparquet 2026.9.0 (`written/write_parquet.py` says what is in them).
+//! Parquet files: small ones written by pyarrow 26.0.1, polars 2.1.0 and fastparquet 2026.9.0
+//! (`written/write_parquet.py` says what is in them).
 
 use kfdesign::input::inspect::inspect;
 use kfdesign::signal::check::FindingKind;
@@ -116,7 +117,8 @@ fn a_panic_over_a_damaged_page_is_one_line() {
     assert_eq!((out.status, out.stdout.as_str(), out.stderr.as_str()), (2, "", line));
 }
 
-/// A page header that declares a list of 2^31 numbers, each of which the crate `parquet` would look for behind the end of the file.
+/// A page header that declares a list of 2^31 numbers, each of which the crate `parquet` would look for behind the
+/// end of the file.
 #[test]
 fn a_header_that_declares_more_than_the_file_has_ends() {
     let mut damaged = DELTA.to_vec();

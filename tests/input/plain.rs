@@ -1,9 +1,10 @@
-//! Names and texts of files, wherever they come out again: no control character, no separator of lines, no mark that turns the direction of
-//! what follows, no formula in a table.
+//! Names and texts of files, wherever they come out again: no control character, no separator of lines, no mark that
+//! turns the direction of what follows, no formula in a table.
 
 use super::super::support::Bench;
 
-/// An escape sequence, a bell, separators of lines and paragraphs, the next line of the C1 controls, an override of the direction, a mark.
+/// An escape sequence, a bell, separators of lines and paragraphs, the next line of the C1 controls, an override of
+/// the direction, a mark.
 const ACTING: &str = "\x1b[31m\x07\u{85}\u{2028}\u{2029}\u{202e}\u{2066}\u{200f}\u{61c}";
 
 fn clean(what: &str, bytes: &[u8]) {

@@ -1,4 +1,5 @@
-//! Headers as vendors' programs and phone apps write them; the rows below are made here. Measured exports are in `measured`.
+//! Headers as vendors' programs and phone apps write them; the rows below are made here. Measured exports are in
+//! `measured`.
 
 use super::{Flags, read, refused};
 use kfdesign::signal::check::FindingKind;
@@ -15,7 +16,8 @@ fn export(header: &str, separator: char, step: f64) -> String {
     format!("{header}\n{}", rows.collect::<String>())
 }
 
-/// A header, its separator and the step of the first column; flags; names of the axes, rate in Hz, and what says the rate.
+/// A header, its separator and the step of the first column; flags; names of the axes, rate in Hz, and what says the
+/// rate.
 struct Export {
     text: String,
     flags: Flags<'static>,

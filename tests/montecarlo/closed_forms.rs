@@ -12,9 +12,10 @@ fn run(bench: &Bench, args: &str) -> Value {
     serde_json::from_str(&out.stdout).unwrap()
 }
 
-/// A filter that starts in its steady state has errors e(k+1) = λ e(k) + …, so the NEES at times D steps apart has the correlation
-/// ρ = λ^(2D) and n of them are worth n²/(n + 2 Σ (n − h) ρ^h) (Bar-Shalom, Li & Kirubarajan 2001, section 5.4). The reference sensor
-/// at 100 Hz has λ = 0.99949048; all 60 000 samples of 600 s are worth 31.1, 100 of them a little less.
+/// A filter that starts in its steady state has errors e(k+1) = λ e(k) + …, so the NEES at times D steps apart has
+/// the correlation ρ = λ^(2D) and n of them are worth n²/(n + 2 Σ (n − h) ρ^h) (Bar-Shalom, Li & Kirubarajan 2001,
+/// section 5.4). The reference sensor at 100 Hz has λ = 0.99949048; all 60 000 samples of 600 s are worth 31.1, 100
+/// of them a little less.
 #[test]
 fn correlated_errors_count_as_few_independent_ones() {
     let sensor = r#"{"format": "kfdesign-params/1", "quantity": "angular-rate", "sample_rate": "100 Hz", "axes": [{"name": "x",
@@ -45,8 +46,9 @@ fn correlated_errors_count_as_few_independent_ones() {
     assert!((all - 31.1).abs() < 0.05 && found < all && found > 0.95 * all, "{found} {all}");
 }
 
-/// Runs are independent: the share of 1000 runs within k sigma at one time is binomial. Bounds of 5 standard deviations for 1 and 2 sigma
-/// (6e-7 for each of 8 numbers, a little more for the skewed ones), of 15 misses beyond 3 sigma where 2.7 are expected (3e-8 each).
+/// Runs are independent: the share of 1000 runs within k sigma at one time is binomial. Bounds of 5 standard
+/// deviations for 1 and 2 sigma (6e-7 for each of 8 numbers, a little more for the skewed ones), of 15 misses beyond
+/// 3 sigma where 2.7 are expected (3e-8 each).
 #[test]
 fn errors_are_within_their_sigmas_as_often_as_normal_ones() {
     let bench = bench(SMALL);
@@ -66,9 +68,10 @@ fn errors_are_within_their_sigmas_as_often_as_normal_ones() {
     }
 }
 
-/// All noise of the filter `factor` times the true one: the gains stay, so the errors are 1/factor of what is claimed. The squared ones then are
-/// 20 log10(factor) dB too small: the inclination is minus that (Li & Zhao 2006: positive is optimistic), NCI its absolute value. Within 5
-/// standard errors of the mean log NEES, which NCI does not exceed (6e-7 each).
+/// All noise of the filter `factor` times the true one: the gains stay, so the errors are 1/factor of what is
+/// claimed. The squared ones then are 20 log10(factor) dB too small: the inclination is minus that (Li & Zhao 2006:
+/// positive is optimistic), NCI its absolute value. Within 5 standard errors of the mean log NEES, which NCI does
+/// not exceed (6e-7 each).
 #[test]
 fn credibility_has_the_size_and_the_sign_of_the_mistake() {
     let bench = bench(SMALL);
@@ -106,9 +109,9 @@ fn credibility_has_the_size_and_the_sign_of_the_mistake() {
     }
 }
 
-/// 200 whole experiments at alpha 0.2: the number of false alarms, and of each test alone, is binomial with a mean of 40. Outside 16 to 66 with a
-/// probability of 6e-6, 6e-5 for the verdict and the nine tests. Without any care for multiplicity the verdict would
-/// alarm in 1 − 0.8⁹ of them, 173; with Bonferroni's on fully dependent tests in 4.
+/// 200 whole experiments at alpha 0.2: the number of false alarms, and of each test alone, is binomial with a mean
+/// of 40. Outside 16 to 66 with a probability of 6e-6, 6e-5 for the verdict and the nine tests. Without any care for
+/// multiplicity the verdict would alarm in 1 − 0.8⁹ of them, 173; with Bonferroni's on fully dependent tests in 4.
 #[test]
 fn false_alarms_are_as_many_as_intended() {
     let bench = bench(SMALL);

@@ -23,7 +23,8 @@ fn course(params: &str, truth: Option<&str>) -> Course {
         .unwrap()
 }
 
-/// [`SMALL`] with a second drift: other states than the filter's, and five in all where the filter has it too with a third.
+/// [`SMALL`] with a second drift: other states than the filter's, and five in all where the filter has it too with a
+/// third.
 fn drifts(count: usize) -> String {
     changed(SMALL, |value| {
         let all = (0..count).map(|i| {
@@ -42,9 +43,10 @@ fn line() -> String {
     })
 }
 
-/// NEES and NIS of runs 3..24 (two groups of lanes and a part of a third) added up from the runs one by one, the covariance from a filter
-/// of its own. In registers (two states; four, of which two drive each other), in memory (five), and where filter and truth differ: in the number
-/// of states, in parameters alone, and in what is measured of as many states. Rounding of sums over 21 runs: 1e-9.
+/// NEES and NIS of runs 3..24 (two groups of lanes and a part of a third) added up from the runs one by one, the
+/// covariance from a filter of its own. In registers (two states; four, of which two drive each other), in memory
+/// (five), and where filter and truth differ: in the number of states, in parameters alone, and in what is measured
+/// of as many states. Rounding of sums over 21 runs: 1e-9.
 #[test]
 fn averages_are_those_of_the_runs_one_by_one() {
     let cases = [
@@ -109,7 +111,8 @@ fn threads_leave_no_trace() {
     assert_eq!(on(1), on(3));
 }
 
-/// A true filter stays between the χ² bounds at each of 600 steps: NEES and NIS both, 2e-9 each side and step, 4.8e-6 in all.
+/// A true filter stays between the χ² bounds at each of 600 steps: NEES and NIS both, 2e-9 each side and step,
+/// 4.8e-6 in all.
 #[test]
 fn a_true_filter_stays_between_its_bounds() {
     let found = &course(SMALL, None).every_step(0..500)[0];

@@ -67,8 +67,9 @@ fn until_it_listens(pid: u32) {
     panic!("no handler of SIGINT within a minute");
 }
 
-/// Starts the command, interrupts it once it listens, and returns its exit status and what it said on stderr. A process whose flags are
-/// not read yet when the signal comes has nothing to keep and ends by it: it is started again.
+/// Starts the command, interrupts it once it listens, and returns its exit status and what it said on stderr. A
+/// process whose flags are not read yet when the signal comes has nothing to keep and ends by it: it is started
+/// again.
 #[cfg(target_os = "linux")]
 fn interrupted(bench: &Bench, args: &str) -> (Option<i32>, String) {
     (0..100).map(|pause| interrupted_after(bench, args, pause)).find(|(status, _)| status.is_some()).unwrap()

@@ -18,8 +18,9 @@ fn document(bench: &Bench, args: &str) -> (i32, Value) {
     (out.status, serde_json::from_str(&out.stdout).unwrap())
 }
 
-/// The shipped wrong designs are caught, the right one passes. Means are where the covariance analysis expects them: within 5 standard
-/// deviations, NIS as of independent updates, NEES as a scaled χ² (two-sided 6e-7 for each of the 14 numbers).
+/// The shipped wrong designs are caught, the right one passes. Means are where the covariance analysis expects them:
+/// within 5 standard deviations, NIS as of independent updates, NEES as a scaled χ² (two-sided 6e-7 for each of the
+/// 14 numbers).
 #[test]
 fn wrong_designs_are_rejected_and_the_right_one_is_not() {
     let bench = Bench::new();

@@ -39,8 +39,8 @@ fn wideband_density_is_that_of_low_frequencies() {
     assert_relative(model.wideband_density(), 0.0562 * 2f64.sqrt(), 1e-15, "root of the sum of squares");
 }
 
-/// Means over 400 000 samples of y_k y_{k+l}; Bartlett: the variance of such a mean is Σ_j (r_j² + r_{j+l} r_{j−l})/n, 5 standard errors.
-/// False alarm 5.7e-7 for each of five lags.
+/// Means over 400 000 samples of y_k y_{k+l}; Bartlett: the variance of such a mean is Σ_j (r_j² + r_{j+l}
+/// r_{j−l})/n, 5 standard errors. False alarm 5.7e-7 for each of five lags.
 #[test]
 fn sample_path_has_the_autocovariance() {
     let n = 400_000;

@@ -8,7 +8,8 @@ fn behind(numerator: &[f64], denominator: &[f64]) -> Term {
     Term::BandLimit { density: 0.0562, filter: Filter::new(numerator, denominator).unwrap() }
 }
 
-/// A mean of three is the moving average of three, and one pole a fast Gauss-Markov process of the same density at frequency zero.
+/// A mean of three is the moving average of three, and one pole a fast Gauss-Markov process of the same density at
+/// frequency zero.
 #[test]
 fn is_other_terms_in_special_cases() {
     let mean = behind(&[1.0, 1.0, 1.0], &[3.0]);

@@ -62,8 +62,8 @@ fn must_stand_below_half_the_rate() {
     );
 }
 
-/// Means of y_0 y_k over 20 000 independent paths against the autocovariance r_k: standard error √((r_0² + r_k²)/20000), 5 of them.
-/// False alarm 5.7e-7 for each of five lags.
+/// Means of y_0 y_k over 20 000 independent paths against the autocovariance r_k: standard error √((r_0² +
+/// r_k²)/20000), 5 of them. False alarm 5.7e-7 for each of five lags.
 #[test]
 fn sample_path_is_stationary_from_the_start() {
     let runs = 20_000;

@@ -3,8 +3,8 @@
 use super::*;
 use kfdesign::noise::Grid;
 
-/// Every k-th sample of a Gauss-Markov process is one, and of white noise is white noise of √k times the density; a spectrum that falls by
-/// five orders of magnitude to rounding.
+/// Every k-th sample of a Gauss-Markov process is one, and of white noise is white noise of √k times the density; a
+/// spectrum that falls by five orders of magnitude to rounding.
 #[test]
 fn every_kth_sample_in_closed_form() {
     for every in [2_usize, 7, 100] {
@@ -20,8 +20,9 @@ fn every_kth_sample_in_closed_form() {
     }
 }
 
-/// The Allan variance of means of k samples at a factor m is that of the samples at k m, for every process: 4 ∫ S sin⁴(πfmk dt)/(m² sin²(πfk dt)) df.
-/// Midpoints, 4000 of them in u = √(f/fmax), so that the drift's corner at 8e-4 Hz has thirty: 1e-4.
+/// The Allan variance of means of k samples at a factor m is that of the samples at k m, for every process: 4 ∫ S
+/// sin⁴(πfmk dt)/(m² sin²(πfk dt)) df. Midpoints, 4000 of them in u = √(f/fmax), so that the drift's corner at 8e-4
+/// Hz has thirty: 1e-4.
 #[test]
 fn means_have_the_allan_variance_of_what_they_average() {
     let points = 4000;

@@ -1,5 +1,5 @@
-//! Values at 120 digits: mpmath 1.3, the nine-term sum of the generalised covariance (formulas in `src/noise`), itself checked
-//! against the double sum over the autocovariance for windows up to 5 samples to 1e-114.
+//! Values at 120 digits: mpmath 1.3, the nine-term sum of the generalised covariance (formulas in `src/noise`),
+//! itself checked against the double sum over the autocovariance for windows up to 5 samples to 1e-114.
 
 /// Gauss–Markov, σ = dt = 1: x = dt/Tc, m1, m2, h, covariance, √(r_0(m1) r_0(m2)).
 #[rustfmt::skip]

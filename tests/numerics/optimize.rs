@@ -182,8 +182,8 @@ fn second_differences() {
     }
 }
 
-/// The inverse of [[a², r a b], [r a b, b²]] is [[1/a², −r/(a b)], [−r/(a b), 1/b²]]/(1 − r²), over twenty decades; of what
-/// is no sum of squares there is none.
+/// The inverse of [[a², r a b], [r a b, b²]] is [[1/a², −r/(a b)], [−r/(a b), 1/b²]]/(1 − r²), over twenty decades;
+/// of what is no sum of squares there is none.
 #[test]
 fn covariances() {
     let (a, b, r) = (1e10, 1e-10, 0.6);

@@ -43,8 +43,8 @@ fn the_gate_finds_the_angle_filter_consistent_and_its_bias_sigma_true() {
     }
 }
 
-/// Another road than the gate's: sensor streams from `simulate` with a turning vehicle, its true angle summed up here, the heading made
-/// here. Each bound is left with probability 1e-5.
+/// Another road than the gate's: sensor streams from `simulate` with a turning vehicle, its true angle summed up
+/// here, the heading made here. Each bound is left with probability 1e-5.
 #[test]
 fn simulated_flights_are_followed_as_claimed() {
     const FLIGHTS: u64 = 40;

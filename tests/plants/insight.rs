@@ -40,7 +40,8 @@ fn at_factor_one_it_is_the_design() {
     }
 }
 
-/// All noise of a sensor at rest times f is its error times f; of a random walk beside white noise the error grows like √(f of either).
+/// All noise of a sensor at rest times f is its error times f; of a random walk beside white noise the error grows
+/// like √(f of either).
 #[test]
 fn sigma_scales_with_the_noise() {
     let (_, insight) = both(&gyro(r#"{"plant": "static"}"#));
@@ -61,7 +62,8 @@ fn sigma_scales_with_the_noise() {
     }
 }
 
-/// A faster aid with as much noise per second says the same: rate × f with σ × √f changes the error by less than one aid interval's worth.
+/// A faster aid with as much noise per second says the same: rate × f with σ × √f changes the error by less than one
+/// aid interval's worth.
 #[test]
 fn an_aid_twice_as_fast_is_one_with_less_noise() {
     let aid = |sigma: f64, rate: f64| {
@@ -179,7 +181,8 @@ fn a_constant_is_known_when_the_samples_say_so() {
     assert!(insight.outputs.is_empty() && insight.mistakes.iter().all(|m| m.real_over_claimed.is_empty()));
 }
 
-/// One state and white noise alone: |T|² = (1 − λ)²/|1 − λ e^(−jω)|² per measurement, half of it at cos ω = (1 + λ² − 2 (1 − λ)²)/2λ.
+/// One state and white noise alone: |T|² = (1 − λ)²/|1 − λ e^(−jω)|² per measurement, half of it at cos ω = (1 + λ²
+/// − 2 (1 − λ)²)/2λ.
 #[test]
 fn the_bandwidth_of_an_aided_angle_is_that_of_its_pole() {
     let mut params = gyro(r#"{"plant": "angle", "aids": [{"name": "heading", "std_dev": "0.2 deg", "rate": "2 Hz"}]}"#);

@@ -17,7 +17,8 @@ fn matrix(value: &Value) -> DMatrix<f64> {
     DMatrix::from_fn(rows.len(), rows.first().map_or(0, Vec::len), |i, j| rows[i][j])
 }
 
-/// Largest difference relative to what the rows and columns are of: √(d_ii d_jj) of a covariance, the largest entry of others.
+/// Largest difference relative to what the rows and columns are of: √(d_ii d_jj) of a covariance, the largest entry
+/// of others.
 fn apart(found: &DMatrix<f64>, expected: &DMatrix<f64>) -> f64 {
     assert_eq!(found.shape(), expected.shape());
     (found - expected).amax() / expected.amax().max(f64::MIN_POSITIVE)
@@ -89,7 +90,8 @@ fn the_sampled_integration_tends_to_the_continuous_one() {
         let tuned = tune(&params, &TuneOptions::default()).unwrap();
         let model = &tuned.design.axes[0].model;
         let (f, q) = angle_and_drift(density, std_dev, tc, dt);
-        // states angle, bias, gauss_markov; held over a sample instead of decaying within it: relative dt/2Tc, to second order
+        // states angle, bias, gauss_markov; held over a sample instead of decaying within it: relative dt/2Tc, to
+        // second order
         let x = dt / tc;
         let of_drift = model.f[(0, 2)] / f[(0, 1)] - 1.0;
         assert!((of_drift - x / 2.0).abs() < x * x, "{of_drift} {x}");

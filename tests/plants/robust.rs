@@ -46,9 +46,9 @@ fn rms_after(found: &[f64], truth: &[f64], from: usize) -> f64 {
     (squares / (found.len() - from) as f64).sqrt()
 }
 
-/// One heading in twenty is 40 deg off. Five percent of outliers, clipped at three sigma, add little: the error stays within twice the claimed
-/// sigma (0.46 deg; an average over nine minutes, fifteen settling times), and what is judged is consistent (1e-5). The plain filter is
-/// more than twice as wrong and is found out.
+/// One heading in twenty is 40 deg off. Five percent of outliers, clipped at three sigma, add little: the error
+/// stays within twice the claimed sigma (0.46 deg; an average over nine minutes, fifteen settling times), and what
+/// is judged is consistent (1e-5). The plain filter is more than twice as wrong and is found out.
 #[test]
 fn outliers_of_an_aid_are_clipped() {
     let bench = Bench::new();
@@ -79,7 +79,8 @@ fn outliers_of_an_aid_are_clipped() {
     assert!(gated["tests"].as_array().unwrap().iter().any(|t| t["name"] == "rejected" && t["pass"] == false));
 }
 
-/// After five minutes the compass is turned by 60 deg for good. A gate believes the old heading for ever; clipped steps walk over to the new one.
+/// After five minutes the compass is turned by 60 deg for good. A gate believes the old heading for ever; clipped
+/// steps walk over to the new one.
 #[test]
 fn a_clipped_filter_finds_back_where_a_gate_is_locked_out() {
     let bench = Bench::new();
@@ -94,7 +95,8 @@ fn a_clipped_filter_finds_back_where_a_gate_is_locked_out() {
     assert!(off("--robust 3") < 5.0);
 }
 
-/// The square root gives the numbers of the Joseph form: estimates and sigmas to 1e-8 of a sigma, over a gap and a long gap too.
+/// The square root gives the numbers of the Joseph form: estimates and sigmas to 1e-8 of a sigma, over a gap and a
+/// long gap too.
 #[test]
 fn the_square_root_replays_as_the_joseph_form() {
     let bench = Bench::new();
@@ -119,7 +121,8 @@ fn the_square_root_replays_as_the_joseph_form() {
     assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-8) && a.len() == 54_300);
 }
 
-/// Without a constant bias the gains settle: after twenty time constants the constant-gain filter is the Kalman filter, with its sigma.
+/// Without a constant bias the gains settle: after twenty time constants the constant-gain filter is the Kalman
+/// filter, with its sigma.
 #[test]
 fn constant_gains_are_those_the_filter_settles_at() {
     let bench = Bench::new();
@@ -163,7 +166,8 @@ fn constant_gains_are_those_the_filter_settles_at() {
     assert_ne!(value(&joseph), value(&constant));
 }
 
-/// The pendulum of data/design with its torque and its encoder: the same as a filter written out here, and consistent (1e-5).
+/// The pendulum of data/design with its torque and its encoder: the same as a filter written out here, and
+/// consistent (1e-5).
 #[test]
 fn a_custom_plant_is_replayed_with_its_known_input() {
     let bench = Bench::new();

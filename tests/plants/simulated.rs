@@ -10,7 +10,8 @@ use crate::support::{Bench, data};
 const HEADING: &str = r#"{"plant": "angle", "initial_std_dev": "30 deg", "aids": [{"name": "heading", "std_dev": "2 deg", "rate": "1 Hz",
     "gauss_markov": {"std_dev": "3 deg", "correlation_time": "60 s"}}]}"#;
 
-/// What `simulate` writes is what the design describes: verdict consistent (1e-5), truth within five claimed sigmas (1 in 2 million each).
+/// What `simulate` writes is what the design describes: verdict consistent (1e-5), truth within five claimed sigmas
+/// (1 in 2 million each).
 #[test]
 fn a_simulated_flight_is_consistent_with_its_design() {
     let bench = Bench::new();
@@ -47,9 +48,9 @@ fn a_simulated_flight_is_consistent_with_its_design() {
     assert!(refused.status == 2 && refused.stderr.contains("custom plant"), "{}", refused.stderr);
 }
 
-/// Angle and aid by their definition: θ⁺ = θ + dt ω; a heading within half a turn of zero, at every hundredth sample, whose error has the variance of both
-/// its parts (60 headings of 60 runs, correlated over a minute: some 60 independent values; a chi-square of 60 is within 26 to 110
-/// but for 1e-5). The same numbers for any block size.
+/// Angle and aid by their definition: θ⁺ = θ + dt ω; a heading within half a turn of zero, at every hundredth
+/// sample, whose error has the variance of both its parts (60 headings of 60 runs, correlated over a minute: some 60
+/// independent values; a chi-square of 60 is within 26 to 110 but for 1e-5). The same numbers for any block size.
 #[test]
 fn headings_are_the_angle_with_their_errors() {
     let params = gyro(HEADING);
@@ -101,14 +102,15 @@ fn headings_are_the_angle_with_their_errors() {
         square += sum / 60.0 / (13.0 * DEG * DEG);
     }
     assert!((26.0..110.0).contains(&square), "{square}");
-    // from one heading to the next: 2 (2 deg)² and 2 (3 deg)² (1 − e^(−1/60)); the mean of 3540 squares, neighbours sharing a value, has a relative
-    // standard deviation of √(3/3540) = 2.9 %: five are 15 %
+    // from one heading to the next: 2 (2 deg)² and 2 (3 deg)² (1 − e^(−1/60)); the mean of 3540 squares, neighbours
+    // sharing a value, has a relative standard deviation of √(3/3540) = 2.9 %: five are 15 %
     let expected = (8.0 + 18.0 * -(-1.0_f64 / 60.0).exp_m1()) * DEG * DEG;
     assert!((steps / 3540.0 / expected - 1.0).abs() < 0.15, "{} {expected}", steps / 3540.0);
 }
 
-/// The gate's power is told of aids too. 25 runs of 200 s have 5025 headings: mean NIS has a standard deviation of √(2/5025) = 2 %, and a σ that
-/// is f times too large makes it about 1/f². Seen with 90 % by one of some thirty tests at 1 % together: some five standard deviations, f near 1.05.
+/// The gate's power is told of aids too. 25 runs of 200 s have 5025 headings: mean NIS has a standard deviation of
+/// √(2/5025) = 2 %, and a σ that is f times too large makes it about 1/f². Seen with 90 % by one of some thirty
+/// tests at 1 % together: some five standard deviations, f near 1.05.
 #[test]
 fn the_gate_says_what_it_sees_of_an_aid() {
     let bench = Bench::new();

@@ -13,7 +13,8 @@ fn log_text(z: &[f64], dt: f64) -> String {
     text
 }
 
-/// A filter runs on rates: increments and angles, which other commands turn into rates, are refused, not taken for them.
+/// A filter runs on rates: increments and angles, which other commands turn into rates, are refused, not taken for
+/// them.
 #[test]
 fn increments_are_no_rates() {
     let bench = crate::support::Bench::new();
@@ -34,7 +35,8 @@ fn increments_are_no_rates() {
     assert!(!bench.files().contains(&"f.json".to_string()));
 }
 
-/// The command on a right and on a wrong design: exit status, the document's keys, the estimates file, page and figures.
+/// The command on a right and on a wrong design: exit status, the document's keys, the estimates file, page and
+/// figures.
 #[test]
 fn command_end_to_end() {
     let bench = crate::support::Bench::new();
@@ -97,7 +99,8 @@ fn command_end_to_end() {
     assert_eq!(bench.run("replay wrong.json log.csv --allow-inconclusive").status, 1);
 }
 
-/// `--smooth` over a gap and an outlier: the filtered columns are those of the plain output, to the bit; sigmas shrink, at the last sample nothing does.
+/// `--smooth` over a gap and an outlier: the filtered columns are those of the plain output, to the bit; sigmas
+/// shrink, at the last sample nothing does.
 #[test]
 fn command_smooths() {
     let bench = crate::support::Bench::new();

@@ -1,4 +1,5 @@
-//! A filter that follows its noise: what it finds, that it is the filter of what it found, that it looks at nothing that comes later.
+//! A filter that follows its noise: what it finds, that it is the filter of what it found, that it looks at nothing
+//! that comes later.
 
 use kfdesign::consistency::Verdict;
 use kfdesign::filter::FilterDesign;
@@ -92,8 +93,9 @@ fn innovations(design: &FilterDesign, z: &[f64], missing: &[u64], options: Optio
     (all, replayer.finish().axes.remove(0))
 }
 
-/// White noise alone: n − 1 coefficients of the window with the power Σ (x − mean)², and (m − n)/n times as many with that of the design. The
-/// search ends within 1e-5 in ln L; ln N has the information 2 m, so within √(1e-5/m) = 1e-4 of the maximum.
+/// White noise alone: n − 1 coefficients of the window with the power Σ (x − mean)², and (m − n)/n times as many
+/// with that of the design. The search ends within 1e-5 in ln L; ln N has the information 2 m, so within √(1e-5/m) =
+/// 1e-4 of the maximum.
 #[test]
 fn white_noise_is_the_mean_of_window_and_design() {
     let z = path(&[Term::White { density: 0.003 }], 1000, 71, 0);
@@ -127,8 +129,9 @@ fn what_says_nothing_moves_nothing() {
     assert!((density / 0.002 - 1.0).abs() > 1e-6);
 }
 
-/// After the last change the filter is that of the parameters it names, tuned anew: innovations agree once the start is forgotten. Flicker has to be in
-/// the design, for its fast states are part of R. The pole of the drift (10 s and less) has 100 s for it: e⁻¹⁰ of what differs, some per mille.
+/// After the last change the filter is that of the parameters it names, tuned anew: innovations agree once the start
+/// is forgotten. Flicker has to be in the design, for its fast states are part of R. The pole of the drift (10 s and
+/// less) has 100 s for it: e⁻¹⁰ of what differs, some per mille.
 #[test]
 fn the_filter_is_that_of_what_was_found() {
     let kinds: [Vec<Term>; 3] = [
@@ -208,7 +211,8 @@ fn the_filter_is_that_of_what_was_found() {
     }
 }
 
-/// What comes later changes nothing before it, and a gap begins the window anew: with one every 20 samples no window has the 30 that it takes.
+/// What comes later changes nothing before it, and a gap begins the window anew: with one every 20 samples no window
+/// has the 30 that it takes.
 #[test]
 fn it_looks_at_the_past_alone() {
     let terms = [Term::White { density: 0.002 }, line(0.01, 12.0, 2.0)];
@@ -227,9 +231,10 @@ fn it_looks_at_the_past_alone() {
     assert_eq!(result.follow.unwrap().changes, 0);
 }
 
-/// Noise that stays the same, twenty logs of 12,000 samples with a memory of 3000: mean NIS within 4.9 standard deviations of 1 (variance 2/n of the samples
-/// and 2/m of the level; 2e-5 for all), the largest of 50 autocorrelations below 5/√n (3e-5 each, 6e-4 for all; what the parameters are off adds less
-/// than a tenth of 1/√n).
+/// Noise that stays the same, twenty logs of 12,000 samples with a memory of 3000: mean NIS within 4.9 standard
+/// deviations of 1 (variance 2/n of the samples and 2/m of the level; 2e-5 for all), the largest of 50
+/// autocorrelations below 5/√n (3e-5 each, 6e-4 for all; what the parameters are off adds less than a tenth of
+/// 1/√n).
 #[test]
 fn noise_that_stays_the_same_is_left_in_peace() {
     let terms = [Term::White { density: 0.002 }, line(0.02, 12.0, 1.0), Term::RateRandomWalk { density: 1e-4 }];
@@ -245,8 +250,9 @@ fn noise_that_stays_the_same_is_left_in_peace() {
     }
 }
 
-/// A line that slows down from 12 to 11 Hz within 400 s while the white noise grows by 20 %: the filter of the first 200 s fails, the one that follows
-/// does not. Bounds as above; the parameters lag behind by half of the memory, which adds to both.
+/// A line that slows down from 12 to 11 Hz within 400 s while the white noise grows by 20 %: the filter of the first
+/// 200 s fails, the one that follows does not. Bounds as above; the parameters lag behind by half of the memory,
+/// which adds to both.
 #[test]
 fn a_line_that_moves_is_followed() {
     let bench = Bench::new();
@@ -346,8 +352,8 @@ fn refusals() {
     assert!(refused(&design).contains("the plant is 'rate'"), "{}", refused(&design));
 }
 
-/// A line much narrower than a bin of a smooth spectrum would be there (40 Hz of 50, 100 s): its width is seen. ln Tc is known to √(2 Tc/T) = 0.3, the frequency
-/// to 0.014 Hz; bounds are four and five of these (6e-5).
+/// A line much narrower than a bin of a smooth spectrum would be there (40 Hz of 50, 100 s): its width is seen. ln
+/// Tc is known to √(2 Tc/T) = 0.3, the frequency to 0.014 Hz; bounds are four and five of these (6e-5).
 #[test]
 fn narrow_lines_are_seen() {
     let white = Term::White { density: 0.002 };
@@ -384,7 +390,8 @@ fn what_is_not_used_is_not_learnt_from() {
     assert!((density(0) / density(1) - 1.0).abs() < 0.01, "{} {}", density(0), density(1));
 }
 
-/// New noise leaves the estimate and its covariance: what is known of a constant bias never becomes less. The test of x0 ends where the first change is.
+/// New noise leaves the estimate and its covariance: what is known of a constant bias never becomes less. The test
+/// of x0 ends where the first change is.
 #[test]
 fn the_state_stays() {
     let (design, z) = off();
@@ -400,8 +407,8 @@ fn the_state_stays() {
     assert_eq!(followed.start.unwrap().sigmas, short.start.unwrap().sigmas);
 }
 
-/// `cargo test --release -- --ignored --nocapture follow_study`: verdicts on 300 logs of five minutes each of the design's own noise, and on filters whose drift
-/// is 1.5 times too large or too small, by memory.
+/// `cargo test --release -- --ignored --nocapture follow_study`: verdicts on 300 logs of five minutes each of the
+/// design's own noise, and on filters whose drift is 1.5 times too large or too small, by memory.
 #[test]
 #[ignore = "prints a table for docs/validation.md"]
 fn follow_study() {

@@ -74,7 +74,8 @@ impl Bench {
     }
 }
 
-/// A document that any test prints is one of its published schema, `kfdesign schema NAME` of the format "kfdesign-NAME/1".
+/// A document that any test prints is one of its published schema, `kfdesign schema NAME` of the format
+/// "kfdesign-NAME/1".
 pub fn fits_its_schema(printed: &str) {
     static SCHEMAS: Mutex<BTreeMap<String, Value>> = Mutex::new(BTreeMap::new());
     let Ok(document) = serde_json::from_str::<Value>(printed) else { return };
@@ -101,8 +102,8 @@ pub fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("data").join(name)
 }
 
-/// A measured log by its path below the folder of measured logs, or `None` with a printed line when the logs are not here.
-/// The folder is `$KFDESIGN_MEASURED`, else `../shared/data`. With CI=true a missing folder is a failure.
+/// A measured log by its path below the folder of measured logs, or `None` with a printed line when the logs are not
+/// here. The folder is `$KFDESIGN_MEASURED`, else `../shared/data`. With CI=true a missing folder is a failure.
 pub fn measured(name: &str) -> Option<PathBuf> {
     let root = std::env::var_os("KFDESIGN_MEASURED")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);

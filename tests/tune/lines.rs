@@ -56,8 +56,9 @@ fn lines_merge_and_are_no_drift_on_their_own() {
     assert!(report.error_budget.is_empty() && report.bandwidth_hz.is_none());
 }
 
-/// Autocorrelation of the innovations on a simulated hour: with line and average in the filter all of lags 1–50 are within 5.2 standard errors
-/// of zero (2e-7 each, 1e-5 in all) and NIS within 5 of 1 (6e-7); without one of them it is not so: of the average lag one shows.
+/// Autocorrelation of the innovations on a simulated hour: with line and average in the filter all of lags 1–50 are
+/// within 5.2 standard errors of zero (2e-7 each, 1e-5 in all) and NIS within 5 of 1 (6e-7); without one of them it
+/// is not so: of the average lag one shows.
 #[test]
 fn innovations_are_white_with_the_line_in_the_filter() {
     let params = vibrating();
@@ -101,7 +102,8 @@ fn hour(params: &Params) -> Vec<f64> {
     blocks.remove(0).measured
 }
 
-/// Largest |autocorrelation| at lags 1–50 and mean of the normalised squares of a filter's innovations, by the textbook recursion.
+/// Largest |autocorrelation| at lags 1–50 and mean of the normalised squares of a filter's innovations, by the
+/// textbook recursion.
 fn innovations(design: &FilterDesign, log: &[f64]) -> (f64, f64) {
     let model = &design.axes[0].model;
     let (mut x, mut p) = (model.x0.clone(), model.p0.clone());
@@ -120,8 +122,8 @@ fn innovations(design: &FilterDesign, log: &[f64]) -> (f64, f64) {
     (worst, nu.iter().map(|a| a * a).sum::<f64>() / nu.len() as f64)
 }
 
-/// Zeros of F are skipped where there are many: the covariances are those of plain matrix products. Both round once per entry and step, over 300
-/// steps of a stable recursion: 1e-12 of the standard deviations.
+/// Zeros of F are skipped where there are many: the covariances are those of plain matrix products. Both round once
+/// per entry and step, over 300 steps of a stable recursion: 1e-12 of the standard deviations.
 #[test]
 fn many_states_are_filtered_as_by_whole_matrices() {
     let lines = (0..5).map(|i| line(0.1, 11.0 + 6.0 * f64::from(i), 2.0));

@@ -7,8 +7,9 @@ use serde_json::Value;
 use super::{close, gauss_markov, sensor, tuned, white};
 use crate::support::{Bench, data};
 
-/// The numbers of the table are those of the commands above it; whether they are right is tested where `--truth` and `replay` are. The two identified
-/// designs are fits, of which another machine may round the last digit otherwise: half a unit of the last digit shown and 1e-4 beyond.
+/// The numbers of the table are those of the commands above it; whether they are right is tested where `--truth` and
+/// `replay` are. The two identified designs are fits, of which another machine may round the last digit otherwise:
+/// half a unit of the last digit shown and 1e-4 beyond.
 #[test]
 fn the_table_of_wrong_filters_is_true() {
     let page = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/low-pass.md")).unwrap();
@@ -48,9 +49,9 @@ fn the_table_of_wrong_filters_is_true() {
     of("white + fast drift", "drift.json");
 }
 
-/// A drift as fast as the samples is followed up to half their rate: there is no bandwidth to tell, and the words do not say that there is no drift. With
-/// gain K and a = (1 − K) e^(−dt/Tc) the estimate has K/|1 − a e^(−iω)| of the measurement, at half the rate (1 − a)/(1 + a) of what it has at zero: more than
-/// 1/√2 for a < 0.17.
+/// A drift as fast as the samples is followed up to half their rate: there is no bandwidth to tell, and the words do
+/// not say that there is no drift. With gain K and a = (1 − K) e^(−dt/Tc) the estimate has K/|1 − a e^(−iω)| of the
+/// measurement, at half the rate (1 − a)/(1 + a) of what it has at zero: more than 1/√2 for a < 0.17.
 #[test]
 fn a_drift_as_fast_as_the_samples_has_no_bandwidth() {
     let fast = tuned(&sensor(200.0, vec![white(1e-5), gauss_markov(0.02, 0.04)], Some(0.5)));

@@ -15,7 +15,8 @@ fn drift(std_dev: f64, correlation_time: f64, density: f64) -> Params {
     sensor(100.0, vec![white(density), gauss_markov(std_dev, correlation_time)], Some(1e-9))
 }
 
-/// Identity: under its own truth every error is what the filter claims, and that is what `tune` predicts by another road (doubling).
+/// Identity: under its own truth every error is what the filter claims, and that is what `tune` predicts by another
+/// road (doubling).
 #[test]
 fn under_its_own_truth_a_design_is_as_claimed() {
     let params = skydog();
@@ -50,8 +51,9 @@ fn under_its_own_truth_a_design_is_as_claimed() {
     assert!(result.notes.is_empty());
 }
 
-/// The printed table of mis-tuned filters through the whole road from parameters: NEES of the drift in steady state is the square of its
-/// ratio. Ten settling times leave e⁻⁴⁰ of the start; the tolerance is half of the last printed digit (one value lies on the border).
+/// The printed table of mis-tuned filters through the whole road from parameters: NEES of the drift in steady state
+/// is the square of its ratio. Ten settling times leave e⁻⁴⁰ of the start; the tolerance is half of the last printed
+/// digit (one value lies on the border).
 #[test]
 fn mistuned_designs_have_the_printed_nees() {
     let (sigma, tc, n) = (0.0280596, 193.9312, 0.0562);
@@ -88,7 +90,8 @@ fn a_wrong_start_is_a_mean_error_that_fades() {
     close(result.drift.mean[0] / DEGREE, 0.3 * r / (p + r), 1e-12);
     let variance = result.drift.claimed[0].powi(2);
     close(result.drift.real[0], (variance + result.drift.mean[0].powi(2)).sqrt(), 1e-12);
-    // of the bias: mean (1 − K) 0.3, variance (1 − K) 0.01 with K = 0.01/(P + R), by hand 2.737 claimed sigmas; the drift is learnt at once, its share in bias and process slowly
+    // of the bias: mean (1 − K) 0.3, variance (1 − K) 0.01 with K = 0.01/(P + R), by hand 2.737 claimed sigmas; the
+    // drift is learnt at once, its share in bias and process slowly
     assert!(result.drift.mean.last().unwrap().abs() < 0.01 * result.drift.mean[0]);
     assert!(result.nees.is_sorted_by(|a, b| a > b) && result.nees[0].unwrap() > 4.0, "{:?}", result.nees);
     assert_eq!(result.tendency, Tendency::Optimistic);

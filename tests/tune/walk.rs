@@ -1,4 +1,5 @@
-//! The price of a walk against plain recursions of the two filters and of what the wrong one does, step by step, without any matrix of the library.
+//! The price of a walk against plain recursions of the two filters and of what the wrong one does, step by step,
+//! without any matrix of the library.
 
 use kfdesign::tune::{AidedFilter, SensorDrift, WalkTrial};
 use kfdesign::units::Quantity;
@@ -93,8 +94,8 @@ fn ratios(k: f64) -> (Vec<f64>, f64) {
     (found, nees)
 }
 
-/// The walk is right by both recursions, for a walk that is too small, about right and too large; after 3000 s the constant is known to 1e-5 of
-/// the error that stays, which the settled price leaves out.
+/// The walk is right by both recursions, for a walk that is too small, about right and too large; after 3000 s the
+/// constant is known to 1e-5 of the error that stays, which the settled price leaves out.
 #[test]
 fn the_price_of_a_walk_is_that_of_plain_recursions() {
     let trial = trial();
@@ -109,7 +110,8 @@ fn the_price_of_a_walk_is_that_of_plain_recursions() {
     }
 }
 
-/// No walk from a hundredth to a hundred times the found one costs less; a drift that is a walk is its own best walk, at no price.
+/// No walk from a hundredth to a hundred times the found one costs less; a drift that is a walk is its own best
+/// walk, at no price.
 #[test]
 fn the_least_price_is_the_least() {
     let trial = trial();

@@ -193,8 +193,8 @@ enum LimitEntry {
     Each([Measured; 2]),
 }
 
-/// Of sensors from the centre of gravity, each ["0.1 m", "0 m", "0 m"] forward, right, down. That of the gyro is for the
-/// record: all of a rigid body has one rate.
+/// Of sensors from the centre of gravity, each ["0.1 m", "0 m", "0 m"] forward, right, down. That of the gyro is for
+/// the record: all of a rigid body has one rate.
 #[derive(Debug, JsonSchema)]
 #[schemars(deny_unknown_fields)]
 struct PositionsEntry {

@@ -252,8 +252,8 @@ impl Airplane {
         }
     }
 
-    /// The solution, if the controls reach it. `wanted`: the thrust of a point mass, N, which says what is missing where
-    /// there is no solution.
+    /// The solution, if the controls reach it. `wanted`: the thrust of a point mass, N, which says what is missing
+    /// where there is no solution.
     fn judge(
         &self,
         x: &Unknowns,

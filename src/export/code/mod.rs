@@ -1,9 +1,10 @@
 //! A filter as source code: C99 or a `no_std` module of Rust, made of one filter.json.
 //!
-//! The generated code does what [`Running`](crate::filter::Running) does, row by row: in double precision the operations of
-//! [`Kalman`](crate::filter::Kalman) in their order, with the zeros of F, H, Q left out. In single precision it keeps F − I in place of F, adds to x and P
-//! with the rounding error of every sum carried along (Knuth 1997, The Art of Computer Programming 2, section 4.2.2, theorem B), and takes P − K h P for the
-//! entries of P that an update hardly changes, the form of Bucy and Joseph for the others; docs/code.md has what that is worth.
+//! The generated code does what [`Running`](crate::filter::Running) does, row by row: in double precision the
+//! operations of [`Kalman`](crate::filter::Kalman) in their order, with the zeros of F, H, Q left out. In single
+//! precision it keeps F − I in place of F, adds to x and P with the rounding error of every sum carried along (Knuth
+//! 1997, The Art of Computer Programming 2, section 4.2.2, theorem B), and takes P − K h P for the entries of P that
+//! an update hardly changes, the form of Bucy and Joseph for the others; docs/code.md has what that is worth.
 
 mod names;
 mod part;
@@ -126,13 +127,15 @@ pub fn check_name(name: &str) -> Result<(), String> {
     ))
 }
 
-/// Builds the self-test of the files of [`c`] as a program in their folder and runs it: status 0 when the code reproduces our filter.
+/// Builds the self-test of the files of [`c`] as a program in their folder and runs it: status 0 when the code
+/// reproduces our filter.
 pub fn self_test_command(name: &str) -> String {
     let upper = name.to_ascii_uppercase();
     format!("cc -std=c99 -D{upper}_SELF_TEST_MAIN {name}.c {name}_test.c -o {name}_test && ./{name}_test")
 }
 
-/// NAME.h, NAME.c and NAME_test.c. Errors: a name that will not do, over 255 states, nothing that is measured, a number that single precision does not carry.
+/// NAME.h, NAME.c and NAME_test.c. Errors: a name that will not do, over 255 states, nothing that is measured, a
+/// number that single precision does not carry.
 pub fn c(design: &FilterDesign, code: &Code) -> Result<Vec<Source>, String> {
     let sheet = sheet(design, code, Language::C)?;
     Ok(vec![

@@ -1,4 +1,5 @@
-//! What the self-test of the generated code is held against: our own filter on measurements drawn from its own prediction.
+//! What the self-test of the generated code is held against: our own filter on measurements drawn from its own
+//! prediction.
 
 use serde::Serialize;
 
@@ -86,7 +87,8 @@ impl Reference {
     }
 }
 
-/// Measurements that are seldom are taken every third sample here, so that there are several; those of the generated code may come at any sample.
+/// Measurements that are seldom are taken every third sample here, so that there are several; those of the generated
+/// code may come at any sample.
 pub(super) fn vectors(axis: &AxisDesign, code: &Code) -> Vectors {
     let model = &axis.model;
     let float = code.precision == Precision::Float;

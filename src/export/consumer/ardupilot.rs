@@ -1,5 +1,5 @@
-//! ArduPilot EKF3, a Mission Planner `.param` file. Source: AP_NavEKF3: (dt p)² per step for the angle, (dt² p)² for the bias of the delta angle, so
-//! p = N/√dt and p = K/√dt with EKF_TARGET_DT = 0.012 s.
+//! ArduPilot EKF3, a Mission Planner `.param` file. Source: AP_NavEKF3: (dt p)² per step for the angle, (dt² p)² for
+//! the bias of the delta angle, so p = N/√dt and p = K/√dt with EKF_TARGET_DT = 0.012 s.
 
 use super::page::Page;
 use super::walk::Field;

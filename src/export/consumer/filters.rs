@@ -17,8 +17,9 @@ pub struct Aiding {
     pub words: &'static str,
 }
 
-/// A camera at 20 Hz that sees 150 points, each to a pixel, with 460 pixels of focal length: the configurations for EuRoC of VINS-Fusion
-/// (max_cnt 150, FOCAL_LENGTH 460) and OpenVINS (up_msckf_sigma_px 1). rad, the mean of all points.
+/// A camera at 20 Hz that sees 150 points, each to a pixel, with 460 pixels of focal length: the configurations for
+/// EuRoC of VINS-Fusion (max_cnt 150, FOCAL_LENGTH 460) and OpenVINS (up_msckf_sigma_px 1). rad, the mean of all
+/// points.
 const CAMERA: f64 = 1.0 / (460.0 * 12.247_448_713_915_89);
 /// s of EKF2_PREDICT_US and EKF_TARGET_DT as shipped.
 const EKF2_STEP: f64 = 0.01;

@@ -1,5 +1,5 @@
-//! Gazebo IMU plugins (RotorS and PX4 dialect), an SDF fragment. Source: their documentation: white densities, driving densities K of Gauss-Markov
-//! drifts with their correlation times, turn-on bias.
+//! Gazebo IMU plugins (RotorS and PX4 dialect), an SDF fragment. Source: their documentation: white densities,
+//! driving densities K of Gauss-Markov drifts with their correlation times, turn-on bias.
 
 use super::numbers::GaussMarkov;
 use super::page::Page;

@@ -1,5 +1,6 @@
-//! gnss-ins-sim, a Python dictionary. Source: Aceinna/gnss-ins-sim, sim/imu_model.py: gyro in deg/h and deg/√h, a Gauss-Markov drift that starts at
-//! zero; an infinite correlation time makes white noise there, so it is never written.
+//! gnss-ins-sim, a Python dictionary. Source: Aceinna/gnss-ins-sim, sim/imu_model.py: gyro in deg/h and deg/√h, a
+//! Gauss-Markov drift that starts at zero; an infinite correlation time makes white noise there, so it is never
+//! written.
 
 use super::numbers::{GaussMarkov, SLOWEST};
 use super::page::Page;

@@ -1,5 +1,5 @@
-//! GTSAM, a Python snippet. Source: borglab/gtsam, navigation/PreintegrationParams.h and CombinedImuFactor.cpp: continuous power densities, divided and
-//! multiplied by dt there.
+//! GTSAM, a Python snippet. Source: borglab/gtsam, navigation/PreintegrationParams.h and CombinedImuFactor.cpp:
+//! continuous power densities, divided and multiplied by dt there.
 
 use super::page::Page;
 use super::walk::Field;

@@ -1,5 +1,5 @@
-//! Kalibr, `imu.yaml`. Source: ethz-asl/kalibr, kalibr_common/ConfigReader.py: continuous densities; the white ones are divided by √dt
-//! there, the walks are used as they are; all four must be positive.
+//! Kalibr, `imu.yaml`. Source: ethz-asl/kalibr, kalibr_common/ConfigReader.py: continuous densities; the white ones
+//! are divided by √dt there, the walks are used as they are; all four must be positive.
 
 use super::page::Page;
 use super::walk::Field;

@@ -1,7 +1,9 @@
-//! MATLAB, a script of gyroparams and accelparams for imuSensor. Source: reference pages of gyroparams, accelparams, imuSensor (R2023b and later).
+//! MATLAB, a script of gyroparams and accelparams for imuSensor. Source: reference pages of gyroparams, accelparams,
+//! imuSensor (R2023b and later).
 //!
-//! NoiseType is written as single-sided: with the default, double-sided, the same numbers give N/√2. A Gauss-Markov drift is the filter 1/(1 − a z⁻¹) on
-//! white noise of deviation σ √(1 − a²) (BiasInstability); MATLAB's own coefficients are another process.
+//! NoiseType is written as single-sided: with the default, double-sided, the same numbers give N/√2. A Gauss-Markov
+//! drift is the filter 1/(1 − a z⁻¹) on white noise of deviation σ √(1 − a²) (BiasInstability); MATLAB's own
+//! coefficients are another process.
 
 use super::page::Page;
 use super::{Export, exponent};

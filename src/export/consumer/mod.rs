@@ -1,7 +1,8 @@
 //! Parameter files for other programs, each in its own convention. One file per consumer.
 //!
-//! Sources: the consumers' own code and documentation, named in each file. Every file begins with at most ten lines of comment: where the numbers come
-//! from, what the consumer does with them, the rule for the walk and its price, the inflation. The numbers follow, then the details.
+//! Sources: the consumers' own code and documentation, named in each file. Every file begins with at most ten lines
+//! of comment: where the numbers come from, what the consumer does with them, the rule for the walk and its price,
+//! the inflation. The numbers follow, then the details.
 
 mod ardupilot;
 mod filters;
@@ -76,7 +77,8 @@ pub struct Written {
     pub warnings: Vec<String>,
 }
 
-/// The file. Errors: a sensor that the consumer needs is not there, does not fit its form, or has no drift and no limit of one.
+/// The file. Errors: a sensor that the consumer needs is not there, does not fit its form, or has no drift and no
+/// limit of one.
 pub fn write(export: &Export) -> Result<Written, String> {
     let mut page = Page::new(export.axes().filter_map(Numbers::note).collect());
     match export.target {

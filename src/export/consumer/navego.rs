@@ -1,4 +1,5 @@
-//! NaveGo, a MATLAB/Octave script. Source: rodralez/navego: `arw` in unit/√Hz, `gb_dyn` σ and `gb_corr` Tc of the Gauss-Markov drift, exact step.
+//! NaveGo, a MATLAB/Octave script. Source: rodralez/navego: `arw` in unit/√Hz, `gb_dyn` σ and `gb_corr` Tc of the
+//! Gauss-Markov drift, exact step.
 
 use super::page::Page;
 use super::{Export, exponent};

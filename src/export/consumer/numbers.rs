@@ -7,8 +7,8 @@ use crate::params::{AxisParams, Measured, Params, TermEntry};
 use crate::tune::{AidedFilter, SensorDrift, WalkPrice, WalkTrial};
 use crate::units::{Quantity, digits};
 
-/// Slowest time constant, s, of the Gauss-Markov processes that stand for flicker; no walk is looked for that is slower, and a simulated drift is
-/// as the sensor's up to averages over this time.
+/// Slowest time constant, s, of the Gauss-Markov processes that stand for flicker; no walk is looked for that is
+/// slower, and a simulated drift is as the sensor's up to averages over this time.
 pub(super) const SLOWEST: f64 = 10_000.0;
 /// s.
 const MINUTE: f64 = 60.0;
@@ -66,8 +66,9 @@ pub(super) struct Settings {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Numbers {
     pub name: String,
-    /// N, root of the two-sided density at low frequencies, unit/√Hz: what a consumer adds up over many samples. White noise, averaged or
-    /// not, and the density of oscillations at zero, which is next to nothing of a narrow line and most of N behind a low-pass in the sensor.
+    /// N, root of the two-sided density at low frequencies, unit/√Hz: what a consumer adds up over many samples.
+    /// White noise, averaged or not, and the density of oscillations at zero, which is next to nothing of a narrow
+    /// line and most of N behind a low-pass in the sensor.
     pub white: Number,
     /// N over that of the white noise alone.
     pub oscillations: f64,
@@ -253,10 +254,12 @@ impl Numbers {
         })
     }
 
-    /// The one Gauss-Markov process of a consumer that has one, beside a walk if `walks`; `None` when nothing is left for it.
+    /// The one Gauss-Markov process of a consumer that has one, beside a walk if `walks`; `None` when nothing is
+    /// left for it.
     ///
-    /// One process is taken as it is. Of several, of flicker, and of a walk where the consumer has none, it is the process whose Allan deviation,
-    /// with the white noise, is nearest the sensor's: the largest ratio (second result) is least over averaging times from a step to `SLOWEST`.
+    /// One process is taken as it is. Of several, of flicker, and of a walk where the consumer has none, it is the
+    /// process whose Allan deviation, with the white noise, is nearest the sensor's: the largest ratio (second
+    /// result) is least over averaging times from a step to `SLOWEST`.
     pub fn single_process(&self, walks: bool) -> Option<(GaussMarkov, f64)> {
         let mut drift = self.drift.clone();
         drift.retain(|term| !(walks && matches!(term, Term::RateRandomWalk { .. })));
@@ -328,7 +331,8 @@ fn as_walk(term: Term, rule: Walk) -> Term {
     }
 }
 
-/// The Gauss-Markov processes that stand for flicker, without those faster than a step: they are white noise to the consumer.
+/// The Gauss-Markov processes that stand for flicker, without those faster than a step: they are white noise to the
+/// consumer.
 fn chain(term: &Term, step: f64) -> Vec<GaussMarkov> {
     let Some(states) = term.realisation(step, SLOWEST) else { return Vec::new() };
     let process = |i: usize| GaussMarkov {
@@ -346,8 +350,9 @@ fn white_interval(axis: &AxisParams) -> Option<[f64; 2]> {
     only.interval_si().filter(|_| floors + 1 == wideband.len())
 }
 
-/// Only where the drift is one random walk with an interval, or one Gauss-Markov process whose intervals bound the walk of the rule: the corners.
-/// The walk that costs least is no monotonic function of a correlation time, and has none.
+/// Only where the drift is one random walk with an interval, or one Gauss-Markov process whose intervals bound the
+/// walk of the rule: the corners. The walk that costs least is no monotonic function of a correlation time, and has
+/// none.
 fn walk_interval(axis: &AxisParams, rule: Walk) -> Option<[f64; 2]> {
     let mut drifts = axis.terms.iter().filter(|term| term.to_term().kind().is_drift());
     let only = drifts.next()?;

@@ -1,4 +1,5 @@
-//! OpenVINS, `kalibr_imu_chain.yaml`. Source: rpng/open_vins, config/euroc_mav, ov_msckf/src/state/Propagator.cpp: Q_d = N²/dt and K² dt.
+//! OpenVINS, `kalibr_imu_chain.yaml`. Source: rpng/open_vins, config/euroc_mav, ov_msckf/src/state/Propagator.cpp:
+//! Q_d = N²/dt and K² dt.
 
 use super::Export;
 use super::kalibr::four;

@@ -1,5 +1,5 @@
-//! ORB-SLAM3 yaml. Source: UZ-SLAMLab/ORB_SLAM3, src/ImuTypes.cc, Settings.cc: white times √IMU.Frequency, walk over it, so that field must be the true
-//! rate; numbers must be real (with a decimal point).
+//! ORB-SLAM3 yaml. Source: UZ-SLAMLab/ORB_SLAM3, src/ImuTypes.cc, Settings.cc: white times √IMU.Frequency, walk over
+//! it, so that field must be the true rate; numbers must be real (with a decimal point).
 
 use super::page::Page;
 use super::walk::Field;

@@ -1,5 +1,5 @@
-//! PX4 EKF2, a QGroundControl `.params` file. Source: PX4/PX4-Autopilot, src/modules/ekf2: (dt p)² per step of the filter for the angle and for the bias,
-//! so p = N/√dt and p = K/√dt with the filter's own step, EKF2_PREDICT_US.
+//! PX4 EKF2, a QGroundControl `.params` file. Source: PX4/PX4-Autopilot, src/modules/ekf2: (dt p)² per step of the
+//! filter for the angle and for the bias, so p = N/√dt and p = K/√dt with the filter's own step, EKF2_PREDICT_US.
 
 use super::page::Page;
 use super::walk::Field;

@@ -1,5 +1,6 @@
-//! VINS-Mono and VINS-Fusion yaml. Source: HKUST-Aerial-Robotics/VINS-Fusion, vins_estimator/src/factor/integration_base.h: per step the angle has the
-//! variance ½ dt² gyr_n² and the bias dt² gyr_w². Physical are N² dt and K² dt, so gyr_n = N √(2/dt) and gyr_w = K/√dt.
+//! VINS-Mono and VINS-Fusion yaml. Source: HKUST-Aerial-Robotics/VINS-Fusion,
+//! vins_estimator/src/factor/integration_base.h: per step the angle has the variance ½ dt² gyr_n² and the bias dt²
+//! gyr_w². Physical are N² dt and K² dt, so gyr_n = N √(2/dt) and gyr_w = K/√dt.
 
 use super::page::Page;
 use super::walk::Field;

@@ -1,4 +1,5 @@
-//! The drift of a sensor as the consumer's field takes it: a walk with its price, or one process; and what is done where no drift is known.
+//! The drift of a sensor as the consumer's field takes it: a walk with its price, or one process; and what is done
+//! where no drift is known.
 
 use super::numbers::{GaussMarkov, Numbers, SLOWEST, Sensor, Walk};
 use super::page::Page;
@@ -6,7 +7,8 @@ use super::{Choice, Export, clamped, device, exponent, walk_unit};
 use crate::tune::{WalkPrice, shared_walk};
 use crate::units::{Quantity, digits};
 
-/// Above it the price is said on the screen: the variance is 1.7 times the least, what most of a second sensor would be needed for.
+/// Above it the price is said on the screen: the variance is 1.7 times the least, what most of a second sensor would
+/// be needed for.
 const DEAR: f64 = 1.3;
 
 /// The place of a walk in a file.
@@ -21,8 +23,9 @@ pub(super) struct Field<'a> {
 }
 
 impl Export {
-    /// The value of the field with one number for all axes, inflated and within its range; its price goes to the page. `None`: leave the line out.
-    /// Errors: no drift is known, nor a limit of one, and the consumer needs a number.
+    /// The value of the field with one number for all axes, inflated and within its range; its price goes to the
+    /// page. `None`: leave the line out. Errors: no drift is known, nor a limit of one, and the consumer needs a
+    /// number.
     pub(super) fn walk(&self, page: &mut Page, field: &Field<'_>) -> Result<Option<f64>, String> {
         let Some(sensor) = self.sensor(field.quantity) else { return Ok(None) };
         let put = |k: f64, page: &mut Page| {
@@ -136,9 +139,9 @@ impl Export {
         }
     }
 
-    /// The one process of a simulator for each axis, inflated, and the walk beside it where it has `walks`. Without a drift the upper limit of a walk;
-    /// a simulator without walks gets it as a process that is a walk up to [`SLOWEST`]. With `default` there is nothing for such an axis.
-    /// Errors: no drift is known, nor a limit of one.
+    /// The one process of a simulator for each axis, inflated, and the walk beside it where it has `walks`. Without
+    /// a drift the upper limit of a walk; a simulator without walks gets it as a process that is a walk up to
+    /// [`SLOWEST`]. With `default` there is nothing for such an axis. Errors: no drift is known, nor a limit of one.
     pub(super) fn processes(
         &self,
         page: &mut Page,

@@ -1,11 +1,12 @@
-//! What a row does to the covariance, by columns, compiled for each instruction set: the same operations in the same order in all of them.
-//! P stays exactly symmetric.
+//! What a row does to the covariance, by columns, compiled for each instruction set: the same operations in the same
+//! order in all of them. P stays exactly symmetric.
 
 use pulp::{Arch, NullaryFnOnce};
 
 use crate::filter::large::add_multiple;
 
-/// P ← P − k phᵀ − ph kᵀ + s k kᵀ, Joseph's form for any gain k, as P − k uᵀ − u kᵀ with u = ph − ½ s k; `ph` becomes u.
+/// P ← P − k phᵀ − ph kᵀ + s k kᵀ, Joseph's form for any gain k, as P − k uᵀ − u kᵀ with u = ph − ½ s k; `ph`
+/// becomes u.
 pub(super) fn take_in(p: &mut [f64], k: &[f64], ph: &mut [f64], s: f64) {
     Arch::new().dispatch(TakeIn { p, k, ph, s });
 }
@@ -32,8 +33,8 @@ impl NullaryFnOnce for TakeIn<'_> {
     }
 }
 
-/// The first three states gain A x of those behind them, A (3 × c, by columns): P_θθ + A P_xθ + P_θx Aᵀ + A P_xx Aᵀ, P_xθ + P_xx Aᵀ.
-/// `w`: scratch of 3 n numbers.
+/// The first three states gain A x of those behind them, A (3 × c, by columns): P_θθ + A P_xθ + P_θx Aᵀ + A P_xx Aᵀ,
+/// P_xθ + P_xx Aᵀ. `w`: scratch of 3 n numbers.
 pub(super) fn turn(p: &mut [f64], a: &[f64], w: &mut [f64]) {
     Arch::new().dispatch(Turn { p, a, w });
 }

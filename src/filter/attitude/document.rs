@@ -34,8 +34,8 @@ pub struct AttitudeDesign {
 /// Layout of attitude.json.
 pub(in crate::filter) const FORMAT: &str = "kfdesign-attitude/1";
 
-/// A multiplicative error-state Kalman filter for attitude. It is nonlinear: the equations are those of docs/plants.md, the numbers these.
-/// Every number is SI.
+/// A multiplicative error-state Kalman filter for attitude. It is nonlinear: the equations are those of
+/// docs/plants.md, the numbers these. Every number is SI.
 #[derive(Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "Attitude")]
@@ -80,7 +80,8 @@ struct NamedDocument {
     unit: String,
 }
 
-/// drift = H x, x(k+1) = F x(k) + v, v ~ N(0, Q); the measured rate is the true one, the drift and white noise of variance R.
+/// drift = H x, x(k+1) = F x(k) + v, v ~ N(0, Q); the measured rate is the true one, the drift and white noise of
+/// variance R.
 #[derive(Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "AttitudeGyro")]

@@ -409,8 +409,8 @@ impl Mekf {
         true
     }
 
-    /// One scalar measurement z = Σ h x + noise with a gain on the states of `gains` alone: P − k (P h)ᵀ − (P h) kᵀ + S k kᵀ, which is
-    /// Joseph's form for any gain k. Gives the innovation over its sigma.
+    /// One scalar measurement z = Σ h x + noise with a gain on the states of `gains` alone: P − k (P h)ᵀ − (P h) kᵀ +
+    /// S k kᵀ, which is Joseph's form for any gain k. Gives the innovation over its sigma.
     fn update(&mut self, h: &[(usize, f64)], z: f64, variance: f64, gains: impl Fn(usize) -> bool) -> f64 {
         let Scratch { ph, k, .. } = &mut self.scratch;
         let (x, p) = (&mut self.x, &mut self.p);

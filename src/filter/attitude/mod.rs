@@ -1,18 +1,22 @@
 //! Attitude from a gyro, an accelerometer and, optionally, a heading: a multiplicative error-state Kalman filter.
 //!
-//! The quaternion q turns vectors of the body into the earth frame (x east, y north, z up). Its error is a small rotation θ in the
-//! earth frame, R = exp(\[θ\]×) R̂ (Lefferts, Markley, Shuster 1982; Markley 2003; Solà 2017, section 7: the global error), beside the states
-//! of each gyro axis, a matrix C of scale factors and misalignments, a constant bias of the accelerometer, the acceleration of the
-//! body and the disturbance and delay of the heading. With g the measured rate, f the specific force and m the field:
+//! The quaternion q turns vectors of the body into the earth frame (x east, y north, z up). Its error is a small
+//! rotation θ in the earth frame, R = exp(\[θ\]×) R̂ (Lefferts, Markley, Shuster 1982; Markley 2003; Solà 2017,
+//! section 7: the global error), beside the states of each gyro axis, a matrix C of scale factors and misalignments,
+//! a constant bias of the accelerometer, the acceleration of the body and the disturbance and delay of the heading.
+//! With g the measured rate, f the specific force and m the field:
 //!
-//! - θ' = −R̂ (δb + δC g + w), w of the gyro's white density and of `motion_density`·|g|, which stands for what scale factors leave;
-//! - R̂ f = g e_z − θ × g e_z + a + R̂ b_f + white, of which the two horizontal parts are measurements. The acceleration a is not white: it is the
-//!   derivative of a bounded velocity, v'' + 2 ω₀ v' + ω₀² v = white, so it has no power at zero frequency. Its size follows the vertical
-//!   part, which attitude errors reach in second order only, as a witness;
-//! - heading of R̂ m against north = θ_z + d + τ (rate about it) + white; d is a first-order Gauss-Markov process in the earth frame, whose
-//!   size follows the parts of the field that heading does not touch (its strength along and across the vertical), and the
-//!   inclination error that the dip carries over; τ is a constant delay. Gains of this measurement on inclination, scale, accelerometer and
-//!   acceleration are zero; the covariance update holds for any gain;
+//! - θ' = −R̂ (δb + δC g + w), w of the gyro's white density and of `motion_density`·|g|, which stands for what
+//!   scale factors leave;
+//! - R̂ f = g e_z − θ × g e_z + a + R̂ b_f + white, of which the two horizontal parts are measurements. The
+//!   acceleration a is not white: it is the derivative of a bounded velocity, v'' + 2 ω₀ v' + ω₀² v = white, so it
+//!   has no power at zero frequency. Its size follows the vertical part, which attitude errors reach in second order
+//!   only, as a witness;
+//! - heading of R̂ m against north = θ_z + d + τ (rate about it) + white; d is a first-order Gauss-Markov process in
+//!   the earth frame, whose size follows the parts of the field that heading does not touch (its strength along and
+//!   across the vertical), and the inclination error that the dip carries over; τ is a constant delay. Gains of this
+//!   measurement on inclination, scale, accelerometer and acceleration are zero; the covariance update holds for any
+//!   gain;
 //! - at rest, when gyro and accelerometer have stayed within their own noise for a window, g = b + white as well.
 //!
 //! An innovation beyond `outlier` sigma has its variance inflated until it is there.
@@ -34,7 +38,8 @@ pub use mekf::{Heading, Mekf, Row, Taken};
 #[derive(Clone, Debug, PartialEq)]
 pub struct AttitudeModel {
     pub dt: f64,
-    /// Errors of the gyro axes x, y, z: states with F, Q, x0, P0; H (one row) makes the drift; R is the white variance of a sample.
+    /// Errors of the gyro axes x, y, z: states with F, Q, x0, P0; H (one row) makes the drift; R is the white
+    /// variance of a sample.
     pub gyro: [LinearModel; 3],
     /// Spread of each element of C.
     pub scale_std_dev: f64,

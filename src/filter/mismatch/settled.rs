@@ -20,10 +20,10 @@ pub struct Settled {
 
 /// [`expect`](super::expect) in the limit of long times.
 ///
-/// `filter.p0` is its steady P(k|k−1) at a sample at which every measurement is taken, so that its gains repeat with the period of
-/// `cycle`. Over one period the joint state of [`expect`](super::expect) obeys s ← M s + n, cov n = N, and its covariance is that of
-/// X = M X Mᵀ + N. States that keep their uncertainty for ever (a constant) must be left out of both models. Means are zero.
-/// Errors: the filter's error grows without bound in this truth.
+/// `filter.p0` is its steady P(k|k−1) at a sample at which every measurement is taken, so that its gains repeat with
+/// the period of `cycle`. Over one period the joint state of [`expect`](super::expect) obeys s ← M s + n, cov n = N,
+/// and its covariance is that of X = M X Mᵀ + N. States that keep their uncertainty for ever (a constant) must be
+/// left out of both models. Means are zero. Errors: the filter's error grows without bound in this truth.
 pub fn expect_settled(
     filter: &LinearModel,
     truth: &LinearModel,

@@ -5,8 +5,8 @@ use pulp::NullaryFnOnce;
 use super::usable;
 use crate::filter::kalman::{predict_fixed, update_fixed};
 
-/// Steps between looks at whether the gains stand still, and variances whose product, each over R, is taken before its logarithm: up to
-/// 1e19 times R cannot make it overflow.
+/// Steps between looks at whether the gains stand still, and variances whose product, each over R, is taken before
+/// its logarithm: up to 1e19 times R cannot make it overflow.
 pub(super) const LOOK: usize = 16;
 
 /// `N` states beside the bias, started: the state is that after an update.
@@ -89,7 +89,8 @@ impl<const N: usize> NullaryFnOnce for Approach<'_, N> {
     }
 }
 
-/// No entry of P differs from that of the step before by more than four roundings of its diagonal, nor the answer by four of its own.
+/// No entry of P differs from that of the step before by more than four roundings of its diagonal, nor the answer by
+/// four of its own.
 #[inline(always)]
 fn still<const N: usize>(before: &[[f64; N]; N], now: &[[f64; N]; N], answered: &[f64; N], answer: &[f64; N]) -> bool {
     const ROUNDINGS: f64 = 4.0 * f64::EPSILON;

@@ -1,8 +1,9 @@
 //! The filter in two stages once its gains have settled: eight samples at a time.
 //!
-//! A linear recursion x ← A x + d z with ν̃ = z − h x gives eight innovations at once: ν̃ = O x + T z with rows −h Aʲ of O and the lower
-//! triangular T of the responses −h Aʲ⁻¹⁻ⁱ d, and so, without another recursion, their sums up to each sample, which are what the bias
-//! needs: b̂ = η/I with η ← η + (s/S̃) ν̃ (the information form of its filter).
+//! A linear recursion x ← A x + d z with ν̃ = z − h x gives eight innovations at once: ν̃ = O x + T z with rows −h
+//! Aʲ of O and the lower triangular T of the responses −h Aʲ⁻¹⁻ⁱ d, and so, without another recursion, their sums up
+//! to each sample, which are what the bias needs: b̂ = η/I with η ← η + (s/S̃) ν̃ (the information form of its
+//! filter).
 
 use pulp::{Simd, WithSimd};
 

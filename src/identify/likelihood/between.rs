@@ -1,11 +1,13 @@
-//! Whether several logs are of one sensor in one condition, parameter by parameter; where they are not, the mean over logs and how far it moves from one to the next.
+//! Whether several logs are of one sensor in one condition, parameter by parameter; where they are not, the mean
+//! over logs and how far it moves from one to the next.
 //!
-//! Each log has its own maximum θ_l on its own cosine coefficients, with the variance v_l. What is well known is held together by
-//! Q = Σ (θ_l − θ̄)²/v_l, what is not by twice the fall of Σ ln L_l when one value has to do for all logs, the other parameters free in each: both are χ²_{k−1}
-//! where the k logs do not differ. Where they do, θ_l ~ N(μ, τ² + v_l): τ² is where Q(τ²) = Σ (θ_l − μ)²/(τ² + v_l) is its expectation k − 1, its 95 % limits where
-//! Q is at the quantiles of χ²_{k−1}, and μ has the interval of Student's t with k − 1 degrees of freedom. All of logarithms.
-//! Lines are not compared, nor is the shape of a filter.
-//! Sources: Cochran 1954 (Q); Paule & Mandel 1982 (τ²); Viechtbauer 2007 (limits of τ²); Hartung & Knapp 2001 (interval of μ); Wilks 1938.
+//! Each log has its own maximum θ_l on its own cosine coefficients, with the variance v_l. What is well known is
+//! held together by Q = Σ (θ_l − θ̄)²/v_l, what is not by twice the fall of Σ ln L_l when one value has to do for
+//! all logs, the other parameters free in each: both are χ²_{k−1} where the k logs do not differ. Where they do, θ_l
+//! ~ N(μ, τ² + v_l): τ² is where Q(τ²) = Σ (θ_l − μ)²/(τ² + v_l) is its expectation k − 1, its 95 % limits where Q
+//! is at the quantiles of χ²_{k−1}, and μ has the interval of Student's t with k − 1 degrees of freedom. All of
+//! logarithms. Lines are not compared, nor is the shape of a filter. Sources: Cochran 1954 (Q); Paule & Mandel 1982
+//! (τ²); Viechtbauer 2007 (limits of τ²); Hartung & Knapp 2001 (interval of μ); Wilks 1938.
 
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -26,7 +28,8 @@ use crate::units::digits;
 
 /// Chance that an axis whose logs do not differ is said to differ in anything.
 const LEVEL: f64 = 0.01;
-/// Standard deviation of a logarithm up to which its likelihood is a parabola, and beyond which one log says too little to be held against others.
+/// Standard deviation of a logarithm up to which its likelihood is a parabola, and beyond which one log says too
+/// little to be held against others.
 const PARABOLA: f64 = 0.03;
 const VAGUE: f64 = 1.0;
 /// One value for all logs is looked for to this share of what they span: 0.1 % of the ratio.
@@ -85,7 +88,8 @@ struct Place {
 }
 
 impl Identified {
-    /// Holds the logs against each other; where a parameter differs, its value and interval become those of the mean over logs. `stretches`: one per log.
+    /// Holds the logs against each other; where a parameter differs, its value and interval become those of the mean
+    /// over logs. `stretches`: one per log.
     pub(in super::super) fn with_spread(mut self, stretches: &[&[f64]]) -> Identified {
         let Some(Fitted { fit, lines, .. }) = self.fitted.clone().filter(|_| stretches.len() > 1) else { return self };
         let long: Vec<bool> = stretches.iter().map(|own| own.len() >= FEWEST_SAMPLES).collect();

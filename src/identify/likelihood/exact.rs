@@ -12,17 +12,20 @@ use crate::noise::{Kind, NoiseModel};
 use crate::numerics::optimize::{hessian, shifted};
 use crate::units::Quantity;
 
-/// Numbers that a step of the search may cost: samples × (states² + 4 states) × (1 + 2 parameters), some seconds in all; above, the cosine
-/// coefficients have the last word.
+/// Numbers that a step of the search may cost: samples × (states² + 4 states) × (1 + 2 parameters), some seconds in
+/// all; above, the cosine coefficients have the last word.
 const MOST_WORK: f64 = 5e8;
-/// Steps of the search at most, from far away most of them; it ends when another would gain less than half of this in ln L: 3e-5 standard deviations from the maximum.
+/// Steps of the search at most, from far away most of them; it ends when another would gain less than half of this
+/// in ln L: 3e-5 standard deviations from the maximum.
 const STEPS: usize = 40;
 const ENOUGH: f64 = 1e-9;
-/// Twice the gain in ln L of a step from a place that is still far away: the curvature there is not that of the maximum.
+/// Twice the gain in ln L of a step from a place that is still far away: the curvature there is not that of the
+/// maximum.
 const FAR: f64 = 100.0;
 /// Longest step, in logarithms.
 const REACH: f64 = 1.0;
-/// Step of numerical derivatives in standard deviations: small enough that third derivatives of order one leave 2e-5 of a standard deviation.
+/// Step of numerical derivatives in standard deviations: small enough that third derivatives of order one leave 2e-5
+/// of a standard deviation.
 const STEP: f64 = 0.01;
 /// Rounding of ln L, relative: a sum of many terms.
 const ROUNDING: f64 = 1e-13;
@@ -35,7 +38,8 @@ pub(super) struct Refined {
     pub(super) log_likelihood: f64,
     /// That were seen.
     pub(super) samples: usize,
-    /// Of the logarithms, by second differences; only where there is more than the one stretch that the cosine coefficients saw.
+    /// Of the logarithms, by second differences; only where there is more than the one stretch that the cosine
+    /// coefficients saw.
     pub(super) information: Option<DMatrix<f64>>,
     /// Per log.
     pub(super) biases: Vec<LogLikelihood>,
@@ -127,11 +131,11 @@ impl<'a> Exact<'a> {
         })
     }
 
-    /// From the maximum on the cosine coefficients, by a quasi-Newton method that begins with their information: it is nearly that of the exact
-    /// likelihood, and what its slopes tell of the difference is added (BFGS: Broyden, Fletcher, Goldfarb, Shanno 1970).
-    /// Far away from the maximum that information is taken anew at every place (Fisher 1925, scoring).
-    /// Not `optimize::minimize`: that begins with a unit matrix, and every step it spends on learning goes through all
-    /// samples.
+    /// From the maximum on the cosine coefficients, by a quasi-Newton method that begins with their information: it
+    /// is nearly that of the exact likelihood, and what its slopes tell of the difference is added (BFGS: Broyden,
+    /// Fletcher, Goldfarb, Shanno 1970). Far away from the maximum that information is taken anew at every place
+    /// (Fisher 1925, scoring). Not `optimize::minimize`: that begins with a unit matrix, and every step it spends on
+    /// learning goes through all samples.
     pub(super) fn refine(&self, start: &[f64], bounds: &[(f64, f64)]) -> Option<Refined> {
         let more = self.samples() as f64 * self.data.dt / self.data.total_s();
         let expected = |at: &[f64]| whittle::expected_information(self.data, self.form, at) * more;

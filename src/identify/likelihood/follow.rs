@@ -1,12 +1,15 @@
 //! Wideband noise of a known model, found anew from the last samples of a log: noise that changes is followed.
 //!
-//! Whittle's likelihood of a window of n samples, and that of m − n more whose spectrum is exactly that of the design, S⁰ (a conjugate prior; m is
-//! the memory, so that the design is worth as much as the samples that are not there yet): with w = (m − n)/n,
+//! Whittle's likelihood of a window of n samples, and that of m − n more whose spectrum is exactly that of the
+//! design, S⁰ (a conjugate prior; m is the memory, so that the design is worth as much as the samples that are not
+//! there yet): with w = (m − n)/n,
 //!
 //! −ln L(θ) = ½ Σ_j [(1 + w) ln S_j + (dt c_j² + w S⁰_j)/S_j].
 //!
-//! Only what is no drift (also Gauss-Markov processes of a few samples) is free, the shape of a filter that was searched included: a window says less about slow noise than the log of the design did.
-//! Sources: Whittle 1953; Mehra 1972 (adaptive filtering by maximum likelihood); Bernardo & Smith 2000, section 5.2 (conjugate priors as data).
+//! Only what is no drift (also Gauss-Markov processes of a few samples) is free, the shape of a filter that was
+//! searched included: a window says less about slow noise than the log of the design did. Sources: Whittle 1953;
+//! Mehra 1972 (adaptive filtering by maximum likelihood); Bernardo & Smith 2000, section 5.2 (conjugate priors as
+//! data).
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -21,9 +24,10 @@ use crate::noise::{Filter, Kind, NoiseModel, Role, Term};
 use crate::signal::lines::Line;
 use crate::units::Unit;
 
-/// The noise of one axis as designed and as it is now, wideband terms at the minimum of
-/// −ln L(θ) = ½ Σ_j [(1 + w) ln S_j(θ) + (dt c_j² + w S⁰_j)/S_j(θ)]: c_j cosine coefficients of the last n samples, S⁰ the sampled spectrum of the design,
-/// w = (m − n)/n for a memory of m samples (Whittle 1953; the design as a conjugate prior). Drift stays as designed.
+/// The noise of one axis as designed and as it is now, wideband terms at the minimum of −ln L(θ) = ½ Σ_j [(1 + w) ln
+/// S_j(θ) + (dt c_j² + w S⁰_j)/S_j(θ)]: c_j cosine coefficients of the last n samples, S⁰ the sampled spectrum of
+/// the design, w = (m − n)/n for a memory of m samples (Whittle 1953; the design as a conjugate prior). Drift stays
+/// as designed.
 #[derive(Clone, Debug)]
 pub struct Follower {
     form: Form,
@@ -63,8 +67,9 @@ impl Follower {
         Follower { design: logs.clone(), now: logs, free, form, dt, memory }
     }
 
-    /// Moves to the maximum of the likelihood of `window`, the last samples (SI, contiguous, finite; no more than the memory), searched from where it
-    /// was and from the design. False where they say nothing: fewer than 30, or all the same.
+    /// Moves to the maximum of the likelihood of `window`, the last samples (SI, contiguous, finite; no more than
+    /// the memory), searched from where it was and from the design. False where they say nothing: fewer than 30, or
+    /// all the same.
     pub fn follow(&mut self, window: &[f64]) -> bool {
         let constant = window.iter().all(|value| *value == window[0]);
         if window.len() < FEWEST_SAMPLES || constant || self.free.is_empty() {

@@ -4,9 +4,11 @@ use std::ops::Range;
 
 use crate::noise::{Filter, HIGHEST_ORDER, Kind, NoiseModel, Role, Term};
 
-/// White noise beside a band limit whose shape is searched, variance over that of its innovations. An ARMA(p, p) process holds any white noise in itself, so that
-/// none of its own can be told; a filter needs some measurement noise. Little, since nothing is left at half the sample rate of what no converter has followed; but not so
-/// little beside the samples, [`LEAST`] of white noise of the same density, that the first update of a covariance loses its digits, and at most [`LARGEST_FLOOR`].
+/// White noise beside a band limit whose shape is searched, variance over that of its innovations. An ARMA(p, p)
+/// process holds any white noise in itself, so that none of its own can be told; a filter needs some measurement
+/// noise. Little, since nothing is left at half the sample rate of what no converter has followed; but not so little
+/// beside the samples, [`LEAST`] of white noise of the same density, that the first update of a covariance loses its
+/// digits, and at most [`LARGEST_FLOOR`].
 const FLOOR: f64 = 1e-9;
 const LEAST: f64 = 1e-8;
 const LARGEST_FLOOR: f64 = 1e-5;
@@ -37,7 +39,8 @@ pub(super) enum Piece {
 }
 
 impl Piece {
-    /// Parameters that stand in the spectrum. The slope of a ramp is none of them: its best value follows from the others.
+    /// Parameters that stand in the spectrum. The slope of a ramp is none of them: its best value follows from the
+    /// others.
     pub(super) fn roles(self) -> &'static [Role] {
         match self {
             Piece::Ramp => &[],
@@ -213,7 +216,8 @@ impl Form {
     }
 }
 
-/// A band limit beside a floor of at most this share of its innovations, and no other white noise, becomes one whose shape is searched, as it was when it was found.
+/// A band limit beside a floor of at most this share of its innovations, and no other white noise, becomes one whose
+/// shape is searched, as it was when it was found.
 fn searched(pieces: &mut Vec<(Piece, Vec<f64>)>, largest: f64) {
     let whites: Vec<usize> = (0..pieces.len()).filter(|i| pieces[*i].0 == Piece::White).collect();
     let limits: Vec<usize> = (0..pieces.len()).filter(|i| matches!(pieces[*i].0, Piece::Filtered(_))).collect();

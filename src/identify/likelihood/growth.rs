@@ -1,8 +1,10 @@
-//! Which processes the log asks for: the model grows from white noise, one process at a time, and is then pruned and rearranged.
+//! Which processes the log asks for: the model grows from white noise, one process at a time, and is then pruned and
+//! rearranged.
 //!
-//! Score = −2 ln L + a cost for every process; the lowest wins. The cost of a process is the gain 2 Δln L that noise alone reaches with a
-//! probability of about half a percent: for one coefficient that may be zero ½χ²₀ + ½χ²₁ (Self & Liang 1987); more where the log has been searched for a
-//! correlation time or a frequency (Davies 1977), which is calibrated by simulation (docs/validation.md).
+//! Score = −2 ln L + a cost for every process; the lowest wins. The cost of a process is the gain 2 Δln L that noise
+//! alone reaches with a probability of about half a percent: for one coefficient that may be zero ½χ²₀ + ½χ²₁ (Self
+//! & Liang 1987); more where the log has been searched for a correlation time or a frequency (Davies 1977), which is
+//! calibrated by simulation (docs/validation.md).
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::{Range, RangeInclusive};
@@ -20,7 +22,8 @@ const MOST_GAUSS_MARKOV: usize = 3;
 const MOST_OSCILLATIONS: usize = 8;
 /// Moving averages of up to so many samples are all tried …
 const EACH_AVERAGE: u32 = 16;
-/// … and of up to so many the [`CARRIED`] that explain most of what is left, since each sample more is a state of the filter; longest that is tried.
+/// … and of up to so many the [`CARRIED`] that explain most of what is left, since each sample more is a state of
+/// the filter; longest that is tried.
 pub(in crate::identify) const LONGEST_AVERAGE: u32 = 64;
 /// What is near an average of more than [`EACH_AVERAGE`] samples differs from it by at most so many.
 const NEAR_AVERAGE: u32 = 2;
@@ -30,7 +33,8 @@ pub(in crate::identify) const MOST_POLES: u8 = 6;
 const FIRST_ORDERS: u8 = 4;
 /// A band limit that remembers longer than so many samples is drift, or a line.
 const LONGEST_MEMORY: f64 = 100.0;
-/// Peak of a band limit over its density at low frequencies, in power: resonances, and noise that rises as differences do; more, and nothing is known of that density.
+/// Peak of a band limit over its density at low frequencies, in power: resonances, and noise that rises as
+/// differences do; more, and nothing is known of that density.
 const LARGEST_GAIN: f64 = 1e4;
 /// Ratio of the correlation times from which a new Gauss-Markov process starts.
 const TIME_RATIO: f64 = 4.0;
@@ -63,7 +67,8 @@ fn cost(piece: Piece, data: &Ordinates) -> f64 {
         Piece::Filtered(_) => 9.0,
         // two coefficients for every pole, searched over everything that they can be
         Piece::BandLimit(order) => 12.0 + 12.0 * f64::from(order),
-        // at one cost, so that likelihood alone decides between a Gauss-Markov process and a chain of them under one coefficient
+        // at one cost, so that likelihood alone decides between a Gauss-Markov process and a chain of them under one
+        // coefficient
         Piece::Flicker | Piece::GaussMarkov => 10.0,
         Piece::Quantization | Piece::RandomWalk => 7.0,
         // beside drift of unknown size noise alone gains more: at 8, 1.7 % of random walks had one
@@ -102,8 +107,8 @@ type OfOrder = (u8, Vec<f64>);
 /// A form with logarithms to climb from, and which of them are new.
 type Start = (Form, Vec<f64>, Range<usize>);
 
-/// Grows a model on `data`: without a band limit first, which would take the power of lines for a resonance of its own; then with one in place of what stands
-/// for it there, and with one from the beginning.
+/// Grows a model on `data`: without a band limit first, which would take the power of lines for a resonance of its
+/// own; then with one in place of what stands for it there, and with one from the beginning.
 pub(super) fn grow(data: &Ordinates) -> Visited {
     let mut visited = Visited::default();
     let white = Form::new(vec![Piece::White]);
@@ -134,7 +139,8 @@ pub(super) fn grow(data: &Ordinates) -> Visited {
     visited
 }
 
-/// The best of the same drift beside a band limit of this order, or one more or less, and no lines, each from many starts; `None` where there are no lines beside a band limit.
+/// The best of the same drift beside a band limit of this order, or one more or less, and no lines, each from many
+/// starts; `None` where there are no lines beside a band limit.
 fn without_lines(data: &Ordinates, fit: &Fit) -> Option<Fit> {
     let pieces = fit.form.pieces();
     let of = |piece: &Piece| if let Piece::BandLimit(order) = piece { Some(*order) } else { None };
@@ -207,8 +213,8 @@ fn placed(data: &Ordinates, base: &Fit, piece: Piece) -> Option<Fit> {
     found.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
 }
 
-/// The maximum when each piece that may stand in the place of another has been taken out and placed anew, until no place is better: drift looks like
-/// a line of low frequency, and a line like a Gauss-Markov process.
+/// The maximum when each piece that may stand in the place of another has been taken out and placed anew, until no
+/// place is better: drift looks like a line of low frequency, and a line like a Gauss-Markov process.
 pub(super) fn replaced(data: &Ordinates, mut fit: Fit) -> Fit {
     let moves = |piece: &Piece| !matches!(piece, Piece::White | Piece::BandLimit(_) | Piece::Ramp);
     if fit.form.pieces().iter().filter(|piece| moves(piece)).count() < 2 {
@@ -303,8 +309,8 @@ fn long_averages(data: &Ordinates, base: &Fit) -> Vec<Piece> {
     found.iter().take(CARRIED).filter(|(gain, _)| *gain > 0.0).map(|(_, piece)| *piece).collect()
 }
 
-/// Not more than a band limit is: it is forgotten soon, so that it takes no drift, and its density is that of the noise, no part of it that is hidden below
-/// something else; true of all without a band limit.
+/// Not more than a band limit is: it is forgotten soon, so that it takes no drift, and its density is that of the
+/// noise, no part of it that is hidden below something else; true of all without a band limit.
 fn limits(fit: &Fit) -> bool {
     fit.form.terms(&fit.logs).all(|term| match term {
         Term::BandLimit { filter, .. } => filter.memory() <= LONGEST_MEMORY && filter.peak_gain() <= LARGEST_GAIN,
@@ -365,8 +371,8 @@ fn band_limits(data: &Ordinates, base: &Fit, orders: RangeInclusive<u8>) -> Vec<
     best.chain(nearly_white).collect()
 }
 
-/// Logarithms of the area ratios of low-passes of this order from a hundredth of the sample rate up: Butterworth's by the bilinear transform, with
-/// their zeros within the unit circle.
+/// Logarithms of the area ratios of low-passes of this order from a hundredth of the sample rate up: Butterworth's
+/// by the bilinear transform, with their zeros within the unit circle.
 fn shapes(order: u8) -> Vec<Vec<f64>> {
     let corners = [0.01, 0.02, 0.04, 0.07, 0.12, 0.18, 0.25, 0.32, 0.4, 0.45];
     let of = |corner: f64| {
@@ -422,7 +428,8 @@ fn rearrangements(data: &Ordinates, base: &Fit) -> Vec<Start> {
     moves
 }
 
-/// A band limit with a pole and a zero more, at first near the origin, or one less; `form`: without it, `own`: its logarithms.
+/// A band limit with a pole and a zero more, at first near the origin, or one less; `form`: without it, `own`: its
+/// logarithms.
 fn other_orders(form: &Form, logs: &[f64], order: u8, own: &[f64]) -> Vec<Start> {
     let (a, b) = own[1..].split_at(usize::from(order));
     let with = |order: u8, a: Vec<f64>, b: Vec<f64>| {
@@ -441,7 +448,8 @@ fn other_orders(form: &Form, logs: &[f64], order: u8, own: &[f64]) -> Vec<Start>
     moves
 }
 
-/// A line that is forgotten within a period is none: it has come for the lobe of an average, say, and stayed for the drift. `own`: its logarithms.
+/// A line that is forgotten within a period is none: it has come for the lobe of an average, say, and stayed for the
+/// drift. `own`: its logarithms.
 fn is_drift(piece: Piece, own: &[f64]) -> bool {
     piece == Piece::Oscillation && own[1] + own[2] < 0.0
 }
@@ -508,7 +516,8 @@ impl<'a> Residual<'a> {
         Residual { data, spectrum: fit.spectrum(data) }
     }
 
-    /// Power factor of `term` that fits the excess best, and how much of the excess it explains (weighted least squares).
+    /// Power factor of `term` that fits the excess best, and how much of the excess it explains (weighted least
+    /// squares).
     fn gain(&self, term: &Term) -> (f64, f64) {
         let (mut cross, mut own) = (0.0, 0.0);
         for ((bin, s), psd) in self.data.bins.iter().zip(&self.spectrum).zip(term.psd_on(&self.data.grid)) {

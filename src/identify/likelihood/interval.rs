@@ -10,7 +10,8 @@ use crate::noise::{Kind, Role};
 use crate::numerics::distribution::{NORMAL_90, NORMAL_95, NORMAL_99};
 use crate::numerics::optimize::covariance;
 
-/// Standard deviation of a logarithm from which the likelihood is no parabola any more; of drift parameters, and of others.
+/// Standard deviation of a logarithm from which the likelihood is no parabola any more; of drift parameters, and of
+/// others.
 const ROUGH: [f64; 2] = [0.03, 0.15];
 /// Of what is no drift where a band limit of many coefficients would have to be found anew at every step of a profile.
 const ROUGH_BESIDE_A_FILTER: f64 = 0.5;
@@ -30,11 +31,12 @@ pub(super) struct Precision {
     pub(super) sigma: f64,
     /// Cramér-Rao bound of the standard deviation, at the estimate.
     pub(super) bound: f64,
-    /// 95 % limits, of the shape of a filter none; None where the likelihood stays above its 95 % level up to the end of what is searched.
+    /// 95 % limits, of the shape of a filter none; None where the likelihood stays above its 95 % level up to the
+    /// end of what is searched.
     pub(super) lower: Option<f64>,
     pub(super) upper: Option<f64>,
-    /// The 90 % interval has both ends: one-sided tests at 5 % refuse that there is nothing of it, and that a correlation time has no end
-    /// (a random walk).
+    /// The 90 % interval has both ends: one-sided tests at 5 % refuse that there is nothing of it, and that a
+    /// correlation time has no end (a random walk).
     pub(super) told: bool,
 }
 
@@ -56,7 +58,8 @@ pub(super) fn precisions(data: &Ordinates, fit: &Fit) -> Vec<Precision> {
     completed(data, fit, &drift_precisions(data, fit))
 }
 
-/// The same, but for what is no drift from the observed information alone: enough to say what the log tells of its drift.
+/// The same, but for what is no drift from the observed information alone: enough to say what the log tells of its
+/// drift.
 pub(super) fn drift_precisions(data: &Ordinates, fit: &Fit) -> Vec<Precision> {
     let bounds = fit.bounds(data);
     let ended = ended(fit, &bounds);
@@ -127,13 +130,15 @@ fn profiled(
     Precision { sigma, bound, lower, upper, told }
 }
 
-/// Numbers of σ of the Gauss-Markov processes whose correlation time has a lower limit and no upper one. Their lower limit is that of 99 %, because that of 95 % is right in 90 % of
-/// the logs in which it is the only one (docs/validation.md).
+/// Numbers of σ of the Gauss-Markov processes whose correlation time has a lower limit and no upper one. Their lower
+/// limit is that of 99 %, because that of 95 % is right in 90 % of the logs in which it is the only one
+/// (docs/validation.md).
 pub(super) fn endless(form: &Form, known: &[Precision]) -> Vec<usize> {
     std_devs_of_endless(form, known, Piece::GaussMarkov)
 }
 
-/// `known` without upper limits of σ where the correlation time has none: σ grows with it, and the end of the search is no limit.
+/// `known` without upper limits of σ where the correlation time has none: σ grows with it, and the end of the search
+/// is no limit.
 pub(super) fn keep_open(form: &Form, mut known: Vec<Precision>) -> Vec<Precision> {
     for piece in [Piece::GaussMarkov, Piece::Oscillation] {
         for std_dev in std_devs_of_endless(form, &known, piece) {
@@ -166,13 +171,14 @@ pub(super) fn ended(fit: &Fit, bounds: &[(f64, f64)]) -> Vec<bool> {
     fit.logs.iter().zip(bounds).map(at_end).collect()
 }
 
-/// The logarithm is that of a correlation time at the shortest that is searched: a limit of the search, where the low end of a coefficient stands for none of it.
+/// The logarithm is that of a correlation time at the shortest that is searched: a limit of the search, where the
+/// low end of a coefficient stands for none of it.
 pub(super) fn shortest(fit: &Fit, bounds: &[(f64, f64)], i: usize) -> bool {
     fit.form.roles()[i].1 == Role::CorrelationTime && fit.logs[i] <= bounds[i].0 + AT_END
 }
 
-/// At least two processes with a parameter of more than 100 % standard deviation, or at the shortest correlation time that is searched. Not those without an end: a steady tone
-/// has no width to be known.
+/// At least two processes with a parameter of more than 100 % standard deviation, or at the shortest correlation
+/// time that is searched. Not those without an end: a steady tone has no width to be known.
 pub(super) fn vague(data: &Ordinates, fit: &Fit, known: &[Precision]) -> bool {
     let bounds = fit.bounds(data);
     let roles = fit.form.roles();
@@ -207,12 +213,13 @@ pub(super) fn deviations(information: DMatrix<f64>) -> Vec<f64> {
     }
 }
 
-/// Where the likelihood, maximised over all other parameters, has fallen by `level`²/2 on the side of the `first` step; within `bounds`, which hold the fit.
-/// Where it has not fallen so far, the root of twice its fall at the end (0 where it cannot be had).
+/// Where the likelihood, maximised over all other parameters, has fallen by `level`²/2 on the side of the `first`
+/// step; within `bounds`, which hold the fit. Where it has not fallen so far, the root of twice its fall at the end
+/// (0 where it cannot be had).
 ///
-/// The signed root of the fall is nearly straight in the logarithm and is followed by secants; where it levels off, by growing steps.
-/// Not `optimize::bracketed_root`: there is no bracket before the end is met, and each place begins where the one
-/// before ended.
+/// The signed root of the fall is nearly straight in the logarithm and is followed by secants; where it levels off,
+/// by growing steps. Not `optimize::bracketed_root`: there is no bracket before the end is met, and each place
+/// begins where the one before ended.
 fn profile(
     data: &Ordinates,
     fit: &Fit,
@@ -228,7 +235,8 @@ fn profile(
     let mut from = fit.logs.clone();
     let roles = fit.form.roles();
     let kind = |i: usize| fit.form.pieces()[roles[i].0].kind();
-    // beside a band limit slow noise is profiled over slow noise and densities: its lines and the shape of its filter stand far away, and would take a search of their own
+    // beside a band limit slow noise is profiled over slow noise and densities: its lines and the shape of its
+    // filter stand far away, and would take a search of their own
     let beside_a_filter = fit.form.has(Kind::BandLimit) && kind(index).is_drift();
     let far_away = |i: usize| beside_a_filter && (roles[i].1 == Role::Shape || kind(i) == Kind::Oscillation);
     let free: Vec<usize> = (0..from.len()).filter(|i| *i != index && !far_away(*i)).collect();
@@ -243,7 +251,8 @@ fn profile(
         if (root - level).abs() < 0.01 {
             return Ok(at);
         }
-        // relative: a frequency is known to parts in 10⁵; where the fall leaps over the level, another maximum was met, and nothing is known
+        // relative: a frequency is known to parts in 10⁵; where the fall leaps over the level, another maximum was
+        // met, and nothing is known
         if far.is_some_and(|far| (far - near).abs() < 1e-3 * (far - centre).abs()) {
             return if (root - level).abs() < LEAP { Ok(at) } else { Err(0.0) };
         }
@@ -288,8 +297,9 @@ mod tests {
         (data, fit)
     }
 
-    /// The search for a limit that ends where the value is (a line that has moved to wider bins than those around its start is narrower than what is
-    /// searched there) finds none, instead of one that the value has passed, or of no width: `tune` refuses the first, and the second claims to know.
+    /// The search for a limit that ends where the value is (a line that has moved to wider bins than those around
+    /// its start is narrower than what is searched there) finds none, instead of one that the value has passed, or
+    /// of no width: `tune` refuses the first, and the second claims to know.
     #[test]
     fn no_limit_is_on_the_wrong_side_of_its_value() {
         let (data, fit) = fitted(1);
@@ -302,8 +312,9 @@ mod tests {
         }
     }
 
-    /// Where a limit stands, the likelihood, at its maximum over all other parameters, has fallen by half of 1.96², of σ beside a correlation time without an upper limit by half of
-    /// 2.576² (the search ends within 0.01 of the root; a parabola's limits are not looked at).
+    /// Where a limit stands, the likelihood, at its maximum over all other parameters, has fallen by half of 1.96²,
+    /// of σ beside a correlation time without an upper limit by half of 2.576² (the search ends within 0.01 of the
+    /// root; a parabola's limits are not looked at).
     #[test]
     fn limits_are_where_the_likelihood_has_fallen() {
         let [mut open, mut closed] = [0; 2];

@@ -11,10 +11,12 @@ use crate::noise::{Grid, Kind, NoiseModel, Role};
 /// Longest correlation time that a maximum is looked for at, in lengths of the log.
 const FURTHEST: f64 = 100.0;
 
-/// The terms of `start` at the maximum of the exact likelihood of all logs, nothing else: no choice of terms, no intervals. With it diffuse
-/// ln L, SI; `start` may be far away, if every parameter is within about a factor of ten or twenty.
+/// The terms of `start` at the maximum of the exact likelihood of all logs, nothing else: no choice of terms, no
+/// intervals. With it diffuse ln L, SI; `start` may be far away, if every parameter is within about a factor of ten
+/// or twenty.
 ///
-/// `None` for a model with flicker noise or a ramp, a likelihood that would take minutes, and a start from which no step leads up.
+/// `None` for a model with flicker noise or a ramp, a likelihood that would take minutes, and a start from which no
+/// step leads up.
 pub fn maximum(start: &NoiseModel, logs: &[Vec<Stretch<'_>>], dt: f64) -> Option<(NoiseModel, f64)> {
     let (form, at) = Form::of(start);
     let samples = logs.iter().flatten().map(|part| part.samples.len()).max()?;

@@ -1,8 +1,11 @@
-//! Maximum likelihood on the cosine coefficients of the log: terms chosen, intervals given, the Cramér-Rao bound beside them.
+//! Maximum likelihood on the cosine coefficients of the log: terms chosen, intervals given, the Cramér-Rao bound
+//! beside them.
 //!
-//! `ordinates` is the log in bins, `form` what a model consists of, `whittle` the likelihood and its maximum, `growth` the choice of the
-//! terms, `interval` what is known of each parameter, `sums` of several together, `plan` how long a log must be for that, `recent` whether it stays the same along the log, `between` whether several logs do not differ, `follow` the wideband part of it anew from the last samples,
-//! `temperature` what of it follows the temperature, `words` what is said beside the numbers.
+//! `ordinates` is the log in bins, `form` what a model consists of, `whittle` the likelihood and its maximum,
+//! `growth` the choice of the terms, `interval` what is known of each parameter, `sums` of several together, `plan`
+//! how long a log must be for that, `recent` whether it stays the same along the log, `between` whether several logs
+//! do not differ, `follow` the wideband part of it anew from the last samples, `temperature` what of it follows the
+//! temperature, `words` what is said beside the numbers.
 
 pub(super) mod between;
 mod exact;
@@ -96,7 +99,8 @@ pub(super) fn identify(
     Whole { name, samples: rate.len(), level: mean(rate), dt, display, choice }.identified(found, curve)
 }
 
-/// Of several stretches those that, cut to one length, have the most samples together: with one length they have the same frequencies.
+/// Of several stretches those that, cut to one length, have the most samples together: with one length they have the
+/// same frequencies.
 fn same_length<'a>(stretches: &[&'a [f64]]) -> Vec<&'a [f64]> {
     let of = |length: usize| length * stretches.iter().filter(|own| own.len() >= length).count();
     let lengths = stretches.iter().map(|own| own.len());
@@ -223,7 +227,8 @@ struct Candidates {
     hold: Option<HoldCost>,
 }
 
-/// `parts`: the log in an earlier and a later part, where it can be cut; `logs`: for the exact likelihood, if that is to have the last word.
+/// `parts`: the log in an earlier and a later part, where it can be cut; `logs`: for the exact likelihood, if that
+/// is to have the last word.
 fn choose(
     data: Ordinates,
     choice: &ModelChoice,
@@ -313,8 +318,8 @@ pub struct Fitted {
     lines: Vec<Line>,
 }
 
-/// From the maximum on the cosine coefficients to that of the exact likelihood of all logs, where there are any and it can be had; searched
-/// from `start`.
+/// From the maximum on the cosine coefficients to that of the exact likelihood of all logs, where there are any and
+/// it can be had; searched from `start`.
 fn refine(
     data: &Ordinates,
     on_cosines: &Fit,
@@ -325,7 +330,8 @@ fn refine(
     let bounds = start.bounds(data);
     let exact = Exact::new(data, &start.form, &start.logs, logs).filter(|_| !logs.is_empty());
     let refined = exact.and_then(|exact| exact.refine(&start.logs, &bounds));
-    // a steady tone is no oscillation of any width that is searched: there the two likelihoods differ by more than either knows
+    // a steady tone is no oscillation of any width that is searched: there the two likelihoods differ by more than
+    // either knows
     let apart = |refined: &Refined| {
         let outside = |(to, old): (&f64, &Precision)| {
             old.lower.is_some_and(|low| *to < low) || old.upper.is_some_and(|high| *to > high)
@@ -345,8 +351,8 @@ fn refine(
     (fitted, refined)
 }
 
-/// What is known of each logarithm at the maximum of the exact likelihood: intervals of what is known well move along, and shrink where there was
-/// more to be seen.
+/// What is known of each logarithm at the maximum of the exact likelihood: intervals of what is known well move
+/// along, and shrink where there was more to be seen.
 fn moved(
     before: &Fit,
     known: &[Precision],
@@ -381,7 +387,8 @@ fn moved(
     interval::keep_open(&before.form, known.iter().enumerate().map(of).collect())
 }
 
-/// The forms that a list of kinds may mean: the length of a moving average, and the order of a band limit, may be open. A band limit brings its own white noise.
+/// The forms that a list of kinds may mean: the length of a moving average, and the order of a band limit, may be
+/// open. A band limit brings its own white noise.
 fn forms(kinds: &[Kind], average: Option<u32>, order: Option<u8>) -> Vec<Form> {
     let limited = kinds.contains(&Kind::BandLimit);
     let with = |samples: u32, order: u8| {
@@ -407,8 +414,8 @@ fn forms(kinds: &[Kind], average: Option<u32>, order: Option<u8>) -> Vec<Form> {
     all
 }
 
-/// Numbers of the drift parameters that the log does not tell. What is faster is judged by the filter's innovations, not by its numbers: also a
-/// Gauss-Markov process that surely forgets within [`FAST`] samples.
+/// Numbers of the drift parameters that the log does not tell. What is faster is judged by the filter's innovations,
+/// not by its numbers: also a Gauss-Markov process that surely forgets within [`FAST`] samples.
 fn unknown(data: &Ordinates, fit: &Fit, known: &[Precision]) -> Vec<usize> {
     let roles = fit.form.roles();
     let fast = |i: usize| {
@@ -518,8 +525,9 @@ fn goodness(data: &Ordinates, fit: &Fit) -> Departure {
     departure(&data.bins.iter().zip(&fit.spectrum(data)).map(of).collect::<Vec<_>>())
 }
 
-/// The best score among models whose parameters are known, those of several vague processes only where no simpler one is there; a model that is close in score takes its place when it foretells the last third of the log
-/// clearly better.
+/// The best score among models whose parameters are known, those of several vague processes only where no simpler
+/// one is there; a model that is close in score takes its place when it foretells the last third of the log clearly
+/// better.
 fn choice_of(data: &Ordinates, fits: &[(Fit, Vec<Precision>)], held_out: &[Option<f64>]) -> usize {
     let told = |i: &usize| told(data, &fits[*i].0, &fits[*i].1);
     let Some(best) = (0..fits.len()).find(told) else { return 0 };

@@ -15,7 +15,8 @@ const WIDTH: f64 = 1.0 / 40.0;
 const NYQUIST_WIDTH: f64 = 0.2;
 /// A log with more of its power than this at one frequency is a sinusoid.
 const TONE: f64 = 0.98;
-/// A bin is halved while its halves, or its middle and its ends, differ in power by more than this in ln, and by more than so many standard deviations.
+/// A bin is halved while its halves, or its middle and its ends, differ in power by more than this in ln, and by
+/// more than so many standard deviations.
 const LEVEL: f64 = 0.1;
 const SURE: f64 = 2.0;
 /// Share of the power within [`ALONE`] coefficients of the largest, in a log that is mostly a tone.
@@ -67,7 +68,8 @@ impl Ordinates {
         Ordinates::gathered(&coefficients, dt, layout, lines)
     }
 
-    /// Stretches of one length, with the lines that stand out of any of them, in bins as fine as all together ask for; `None` of none.
+    /// Stretches of one length, with the lines that stand out of any of them, in bins as fine as all together ask
+    /// for; `None` of none.
     pub(super) fn of_several(rates: &[&[f64]], dt: f64) -> Option<Ordinates> {
         let each: Vec<Vec<f64>> = rates.par_iter().map(|rate| coefficients(rate, dt)).collect();
         let step = step(each.first()?, dt);
@@ -84,7 +86,8 @@ impl Ordinates {
         Ordinates::pooled(&each.par_iter().map(gathered).collect::<Vec<_>>())
     }
 
-    /// Coefficients of a ramp of slope 1: r_j = −√(2/n) dt cos(πj/2n)/(2 sin²(πj/2n)) for odd j, else 0 (summation by parts).
+    /// Coefficients of a ramp of slope 1: r_j = −√(2/n) dt cos(πj/2n)/(2 sin²(πj/2n)) for odd j, else 0 (summation
+    /// by parts).
     fn gathered(coefficients: &[f64], dt: f64, layout: Layout, lines: Vec<Line>) -> Ordinates {
         let n = coefficients.len() + 1;
         let (root, step) = (dt.sqrt(), step(coefficients, dt));
@@ -127,7 +130,8 @@ impl Ordinates {
         }
     }
 
-    /// As if so many more windows, or parts of one, had been seen in which every coefficient is just what `spectrum` expects of it.
+    /// As if so many more windows, or parts of one, had been seen in which every coefficient is just what `spectrum`
+    /// expects of it.
     pub(super) fn pretend(&mut self, windows: f64, spectrum: &[f64]) {
         for (bin, s) in self.bins.iter_mut().zip(spectrum) {
             bin.power += windows * bin.count * s;
@@ -136,7 +140,8 @@ impl Ordinates {
         self.windows += windows;
     }
 
-    /// What a log of so many samples would have before it is recorded: bins without power. `grid` is made of their frequencies.
+    /// What a log of so many samples would have before it is recorded: bins without power. `grid` is made of their
+    /// frequencies.
     pub(super) fn expected(samples: usize, dt: f64, lines: &[Line], grid: impl Fn(&[f64]) -> Grid) -> Ordinates {
         let step = 1.0 / (2.0 * samples as f64 * dt);
         let bin = |(first, size): (usize, usize)| {
@@ -163,8 +168,9 @@ impl Ordinates {
         (low.min(frequency_hz), high.max(frequency_hz), self.bins[at].count / self.windows * step)
     }
 
-    /// Of a log that is a sinusoid: the frequency with most power among those above the coefficients that stand alone, and the share of all power there, within 32
-    /// coefficients, beyond which a sinusoid has less than 1 % of its own.
+    /// Of a log that is a sinusoid: the frequency with most power among those above the coefficients that stand
+    /// alone, and the share of all power there, within 32 coefficients, beyond which a sinusoid has less than 1 % of
+    /// its own.
     pub(super) fn tone(&self) -> Option<(f64, f64)> {
         let step = 1.0 / (2.0 * self.span_s());
         let density = |bin: &&Bin| bin.power / bin.count;
@@ -211,8 +217,9 @@ fn step(coefficients: &[f64], dt: f64) -> f64 {
     1.0 / (2.0 * (coefficients.len() + 1) as f64 * dt)
 }
 
-/// The bins, halved where the spectrum changes within them: at the zeros of an average, on the skirts of a filter. Not those about lines, which are fine enough, and none beside a tone that is most
-/// of the log: the skirts that it has are of the ends of the log, and no process. `power`: of each coefficient, of so many logs together.
+/// The bins, halved where the spectrum changes within them: at the zeros of an average, on the skirts of a filter.
+/// Not those about lines, which are fine enough, and none beside a tone that is most of the log: the skirts that it
+/// has are of the ends of the log, and no process. `power`: of each coefficient, of so many logs together.
 fn halved(power: &[f64], logs: usize, layout: Layout) -> Layout {
     let all: f64 = power.iter().sum();
     let peak = (0..power.len()).max_by(|i, j| power[*i].total_cmp(&power[*j])).unwrap_or(0);
@@ -231,7 +238,8 @@ fn halved(power: &[f64], logs: usize, layout: Layout) -> Layout {
             let quarter = size / 4;
             let of = |part: usize| power[first + part * quarter..first + (part + 1) * quarter].iter().sum::<f64>();
             let [a, b, c, d] = [0, 1, 2, 3].map(of);
-            // each side has 2 · quarter coefficients of every log, the logarithm of its power a variance of 1/(quarter · logs)
+            // each side has 2 · quarter coefficients of every log, the logarithm of its power a variance of
+            // 1/(quarter · logs)
             let limit = LEVEL.max(SURE * (2.0 / (quarter * logs) as f64).sqrt());
             let far = |ratio: f64| ratio.ln().abs() > limit;
             if quarter > 1 && (far((a + b) / (c + d)) || far((a + d) / (b + c))) {

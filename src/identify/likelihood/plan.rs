@@ -1,9 +1,10 @@
 //! Before a log is recorded: how well its maximum likelihood estimates can be known, and how long it must be for that.
 //!
-//! The Cramér-Rao bound of n samples is the inverse of I_ik = ½ Σ_j ∂_i ln S(f_j) ∂_k ln S(f_j), f_j = j/(2 n dt), j = 1 … n − 1, by the
-//! logarithms of the parameters, S the spectrum of the sampled series: the information of its cosine coefficients without the mean. The sum is
-//! made over bins, each coefficient up to the 32nd alone, then 2.5 % wide and finer about lines, so that its cost does not grow with the log.
-//! For a Gauss-Markov process the standard deviations are below those of the exact Gaussian information by up to about 0.9 Tc/T of themselves.
+//! The Cramér-Rao bound of n samples is the inverse of I_ik = ½ Σ_j ∂_i ln S(f_j) ∂_k ln S(f_j), f_j = j/(2 n dt), j =
+//! 1 … n − 1, by the logarithms of the parameters, S the spectrum of the sampled series: the information of its
+//! cosine coefficients without the mean. The sum is made over bins, each coefficient up to the 32nd alone, then 2.5
+//! % wide and finer about lines, so that its cost does not grow with the log. For a Gauss-Markov process the
+//! standard deviations are below those of the exact Gaussian information by up to about 0.9 Tc/T of themselves.
 //! Source: Whittle 1953; Kay 1993, section 3.11.
 
 use schemars::JsonSchema;
@@ -24,8 +25,8 @@ pub const LONGEST_S: f64 = 10.0 * 365.25 * 86_400.0;
 const UNTOLD: f64 = 0.05;
 /// Zeros on the unit circle, where a search does not come to, are moved in to this.
 const LARGEST_ZERO: f64 = 0.98;
-/// What is thought of the logarithm of an area ratio beforehand, one over its variance: nothing that matters where the log tells it, and the rest stays finite
-/// where the samples are too slow to.
+/// What is thought of the logarithm of an area ratio beforehand, one over its variance: nothing that matters where
+/// the log tells it, and the rest stays finite where the samples are too slow to.
 const SHAPE: f64 = 0.01;
 
 /// How the samples of a log are made of those of the sensor.
@@ -120,8 +121,8 @@ impl Planned {
         self.parameters.iter().map(|(name, _)| name.as_str())
     }
 
-    /// Cramér-Rao bound of the relative standard deviation (1 sigma) of every parameter from a log of this length; infinite where the
-    /// log cannot tell the parameter from others.
+    /// Cramér-Rao bound of the relative standard deviation (1 sigma) of every parameter from a log of this length;
+    /// infinite where the log cannot tell the parameter from others.
     pub fn precision(&self, span_s: f64, sampling: &Sampling) -> Vec<f64> {
         self.of_samples((span_s * sampling.rate_hz()).round() as usize, sampling)
     }
@@ -158,10 +159,11 @@ impl Planned {
         self.parameters.iter().map(of).map(|sd| if sd.is_finite() { sd } else { f64::INFINITY }).collect()
     }
 
-    /// Length of the shortest log, s, from which parameter number `index` of [`Planned::names`] is known to this relative standard
-    /// deviation; None beyond [`LONGEST_S`].
+    /// Length of the shortest log, s, from which parameter number `index` of [`Planned::names`] is known to this
+    /// relative standard deviation; None beyond [`LONGEST_S`].
     ///
-    /// Right to 1e-5 or one sample. Standard deviations shrink about like T^(−1/2): by that rule the search jumps, within what it knows.
+    /// Right to 1e-5 or one sample. Standard deviations shrink about like T^(−1/2): by that rule the search jumps,
+    /// within what it knows.
     pub fn duration(&self, index: usize, precision: f64, sampling: &Sampling) -> Option<f64> {
         let rate = sampling.rate_hz();
         let excess = |samples: f64| self.of_samples(samples as usize, sampling)[index] / precision;

@@ -1,10 +1,11 @@
 //! Whether the noise is the same all along the log, or its end tells what follows better than all of it.
 //!
-//! What is known of the future of a sensor is how well its past told what came then. The last third of the log is held against the samples
-//! before it: the parameters of all of them, and those of their last 7/8, 6/8 … 2/8, each at the maximum of its own likelihood (forecasts from
-//! rolling windows of the past: Giacomini & White 2006). In noise that stays the same, all of them tell most. Parameters from elsewhere then lose
-//! about ½ χ²_p (1 + length of the last third/length of the part) against the best that the last third can have, p their number: so much is
-//! what a part could gain at the most, and more than p + 10 is beyond chance.
+//! What is known of the future of a sensor is how well its past told what came then. The last third of the log is
+//! held against the samples before it: the parameters of all of them, and those of their last 7/8, 6/8 … 2/8, each
+//! at the maximum of its own likelihood (forecasts from rolling windows of the past: Giacomini & White 2006). In
+//! noise that stays the same, all of them tell most. Parameters from elsewhere then lose about ½ χ²_p (1 + length of
+//! the last third/length of the part) against the best that the last third can have, p their number: so much is what
+//! a part could gain at the most, and more than p + 10 is beyond chance.
 
 use rayon::prelude::*;
 
@@ -23,7 +24,8 @@ const BEYOND_CHANCE: f64 = 10.0;
 pub struct Recent {
     /// Its first sample.
     pub start: usize,
-    /// ln L of the last third of the log under the parameters of the part before it, less that under those of everything before it.
+    /// ln L of the last third of the log under the parameters of the part before it, less that under those of
+    /// everything before it.
     pub gain: f64,
     /// Samples of that part.
     pub part: usize,
@@ -31,10 +33,11 @@ pub struct Recent {
     pub before: usize,
 }
 
-/// The part of the log (SI, contiguous, finite; `dt` in s) at its end whose parameters should tell best what follows, where that is not all of it.
+/// The part of the log (SI, contiguous, finite; `dt` in s) at its end whose parameters should tell best what
+/// follows, where that is not all of it.
 ///
-/// The same share of the whole log as that of the first two thirds which told the last third best. A short part knows little of slow drift, whatever it gains:
-/// who takes it should compare.
+/// The same share of the whole log as that of the first two thirds which told the last third best. A short part
+/// knows little of slow drift, whatever it gains: who takes it should compare.
 ///
 /// `fitted`: the model as [`identify_logs`](crate::identify::identify_logs) found it in all of the log.
 pub fn recent(rate: &[f64], dt: f64, fitted: &Fitted) -> Option<Recent> {

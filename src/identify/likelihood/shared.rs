@@ -1,4 +1,5 @@
-//! Whether the axes of a sensor have one correlation time: their likelihoods, each at its best but for that time, side by side.
+//! Whether the axes of a sensor have one correlation time: their likelihoods, each at its best but for that time,
+//! side by side.
 
 use std::convert::Infallible;
 
@@ -27,7 +28,8 @@ pub struct SharedTime {
     pub correlation_time_s: f64,
     pub lower_s: Option<f64>,
     pub upper_s: Option<f64>,
-    /// 2 (Σ ln L of the axes − ln L with one time), χ² with one degree of freedom less than there are axes if the time is one.
+    /// 2 (Σ ln L of the axes − ln L with one time), χ² with one degree of freedom less than there are axes if the
+    /// time is one.
     pub likelihood_ratio: f64,
     pub p_value: f64,
 }

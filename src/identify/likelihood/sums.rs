@@ -1,5 +1,5 @@
-//! What the processes of a model are together: white noise at low frequencies, and the growth of the drift over short times. Both are known better than
-//! their parts, and are what files with one white number and one walk hold.
+//! What the processes of a model are together: white noise at low frequencies, and the growth of the drift over
+//! short times. Both are known better than their parts, and are what files with one white number and one walk hold.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -25,7 +25,8 @@ pub struct Sums {
     pub walk: Option<Sum>,
 }
 
-/// Noise that a filter does not follow: all but drift, and Gauss-Markov processes that forget within ten samples, a matter of bandwidth.
+/// Noise that a filter does not follow: all but drift, and Gauss-Markov processes that forget within ten samples, a
+/// matter of bandwidth.
 pub fn counts_as_white(term: &Term, dt: f64) -> bool {
     match *term {
         Term::GaussMarkov { correlation_time, .. } => correlation_time < FAST * dt,

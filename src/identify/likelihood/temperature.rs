@@ -1,19 +1,23 @@
 //! What of the drift follows the temperature: z = b + k (T − T_ref) + noise of the fitted model.
 //!
-//! k by generalised least squares under that noise, not by a straight line through the samples: with P = C⁻¹ − C⁻¹ U (Uᵀ C⁻¹ U)⁻¹ Uᵀ C⁻¹, C the
-//! covariance of the noise, U a column of ones for the bias b of each log (and time, where the model has a ramp),
+//! k by generalised least squares under that noise, not by a straight line through the samples: with P = C⁻¹ − C⁻¹ U
+//! (Uᵀ C⁻¹ U)⁻¹ Uᵀ C⁻¹, C the covariance of the noise, U a column of ones for the bias b of each log (and time,
+//! where the model has a ramp),
 //!
 //! k = Tᵀ P z / Tᵀ P T, var k = 1/(Tᵀ P T).
 //!
-//! C is never formed: the diffuse ln L of a Kalman filter is a constant − ½ zᵀ P z, so that Tᵀ P T = 2 [ln L(0) − ln L(T)] and
-//! Tᵀ P z = ½ [ln L(z − T) − ln L(z + T)], gaps and several logs included. k and the parameters of the noise are searched in turns until k
-//! stays; a parameter of the mean and those of the covariance carry no information on each other, so two or three turns do.
+//! C is never formed: the diffuse ln L of a Kalman filter is a constant − ½ zᵀ P z, so that Tᵀ P T = 2 [ln L(0) − ln
+//! L(T)] and Tᵀ P z = ½ [ln L(z − T) − ln L(z + T)], gaps and several logs included. k and the parameters of the
+//! noise are searched in turns until k stays; a parameter of the mean and those of the covariance carry no
+//! information on each other, so two or three turns do.
 //!
-//! The temperature itself is measured: its noise and steps would pull k to zero (errors in variables), all the more as the whitening that drift
-//! asks for lifts what is fast. It is therefore averaged over [`SMOOTHING_S`]. What noise is left after that is told by two averages made of
-//! alternating blocks of it: half their difference has that noise and no temperature.
+//! The temperature itself is measured: its noise and steps would pull k to zero (errors in variables), all the more
+//! as the whitening that drift asks for lifts what is fast. It is therefore averaged over [`SMOOTHING_S`]. What
+//! noise is left after that is told by two averages made of alternating blocks of it: half their difference has that
+//! noise and no temperature.
 //!
-//! Sources: Aitken 1935; Rosenberg 1973; Wilks 1938 for the likelihood ratio; Fuller 1987, section 1.1, for the errors in variables.
+//! Sources: Aitken 1935; Rosenberg 1973; Wilks 1938 for the likelihood ratio; Fuller 1987, section 1.1, for the
+//! errors in variables.
 
 use rayon::prelude::*;
 
@@ -32,9 +36,11 @@ use crate::signal::smoothing::{moving_average, places};
 use crate::signal::{Gap, lines};
 use crate::units::Unit;
 
-/// Length of the average that the temperature is replaced by, s: short beside the minutes in which a package warms up, long beside the period of its samples.
+/// Length of the average that the temperature is replaced by, s: short beside the minutes in which a package warms
+/// up, long beside the period of its samples.
 pub const SMOOTHING_S: f64 = 10.0;
-/// Length of the blocks by which its noise is told, s; noise that lasts longer, such as a value held for longer, is taken for temperature.
+/// Length of the blocks by which its noise is told, s; noise that lasts longer, such as a value held for longer, is
+/// taken for temperature.
 const BLOCK_S: f64 = 1.0;
 /// Turns of the search at most; it ends when k moves by less than this many standard deviations.
 const TURNS: usize = 6;
@@ -42,7 +48,8 @@ const STILL: f64 = 0.02;
 /// Places that are tried for an end of the interval, and how near one must come, in standard deviations.
 const PLACES: usize = 40;
 const NEAR: f64 = 0.02;
-/// Share of the information on k that a ramp must leave for the two to be told apart, and the longest stretch must have for its noise to be looked at.
+/// Share of the information on k that a ramp must leave for the two to be told apart, and the longest stretch must
+/// have for its noise to be looked at.
 const LEAST_LEFT: f64 = 1e-6;
 
 /// The temperature of a log, sample by sample.
@@ -50,7 +57,8 @@ const LEAST_LEFT: f64 = 1e-6;
 pub struct Smoothed {
     /// Averaged over [`SMOOTHING_S`]; NaN throughout if there is none.
     pub values: Vec<f64>,
-    /// The noise that is left, as large as it is there, though not the same; `None` where samples are too far apart to tell.
+    /// The noise that is left, as large as it is there, though not the same; `None` where samples are too far apart
+    /// to tell.
     pub noise: Option<Vec<f64>>,
 }
 
@@ -96,15 +104,17 @@ pub struct Effect {
     /// k, and its standard deviation under the noise as it was found.
     pub coefficient: f64,
     pub sigma: f64,
-    /// 95 %: between where 2 ln L, the noise at its best for every k, has fallen by χ²₁(0.95). Wider than 1.96 sigma, for the noise is not known.
+    /// 95 %: between where 2 ln L, the noise at its best for every k, has fallen by χ²₁(0.95). Wider than 1.96
+    /// sigma, for the noise is not known.
     pub interval: [f64; 2],
-    /// 2 Δ ln L between the model with and without k, each at its best parameters; χ² with one degree of freedom if k is zero.
+    /// 2 Δ ln L between the model with and without k, each at its best parameters; χ² with one degree of freedom if
+    /// k is zero.
     pub likelihood_ratio: f64,
     pub p_value: f64,
     /// Share of Tᵀ P T that is not noise of the temperature: k is on average this share of the true one.
     pub reliability: Option<f64>,
-    /// The parameters of the model without and with k, in the unit of the log; an end of an interval that the log leaves open is zero or infinite. A ramp has none:
-    /// it shares its own with k.
+    /// The parameters of the model without and with k, in the unit of the log; an end of an interval that the log
+    /// leaves open is zero or infinite. A ramp has none: it shares its own with k.
     pub parameters: Vec<Pair>,
 }
 
@@ -116,9 +126,11 @@ pub struct Pair {
     pub with: Measured,
 }
 
-/// The effect of the temperature on an axis of which `fitted` is the model; `rate`, `logs`, `dt` and `display` as for `identify`.
+/// The effect of the temperature on an axis of which `fitted` is the model; `rate`, `logs`, `dt` and `display` as
+/// for `identify`.
 ///
-/// The error is the reason why nothing can be said: a temperature that does not change, or only as a ramp of the model does.
+/// The error is the reason why nothing can be said: a temperature that does not change, or only as a ramp of the
+/// model does.
 pub fn effect(
     fitted: &Fitted,
     rate: &[f64],
@@ -201,7 +213,8 @@ impl Data<'_> {
         Ordinates::new(&rate, self.dt, lines)
     }
 
-    /// The maximum of the exact likelihood of what does not follow the temperature, from `start`; `near`: that on the cosine coefficients.
+    /// The maximum of the exact likelihood of what does not follow the temperature, from `start`; `near`: that on
+    /// the cosine coefficients.
     fn refined(&self, coefficient: f64, near: &Fit, start: &Fit) -> Fitted {
         let less = |(z, t): (&f64, &f64)| z - coefficient * t;
         let of_log = |(log, beside): (&Vec<Stretch<'_>>, &Vec<Vec<f64>>)| {
@@ -220,7 +233,8 @@ impl Data<'_> {
         refine(&data, near, &precisions(&data, near), start, &logs).0
     }
 
-    /// Diffuse ln L of every log with f(z, t) in the place of its samples z, t what is beside them; z and with it the bias counts from the mean of the log.
+    /// Diffuse ln L of every log with f(z, t) in the place of its samples z, t what is beside them; z and with it
+    /// the bias counts from the mean of the log.
     fn each(&self, model: &LinearModel, beside: &Beside, f: impl Fn(f64, f64) -> f64 + Sync) -> Vec<LogLikelihood> {
         let of_log = |(log, beside): (&Vec<Stretch<'_>>, &Vec<Vec<f64>>)| {
             let level = level(log);
@@ -280,11 +294,13 @@ impl Data<'_> {
         (squares[0] / squares[1]).sqrt()
     }
 
-    /// Where, to both sides of k, 2 ln L has fallen by χ²₁(0.95) from its value there, the noise at its best for every k: searched from each of `noise`, that of the model with k and
-    /// that without, for drift that k took the place of may be there all the same.
+    /// Where, to both sides of k, 2 ln L has fallen by χ²₁(0.95) from its value there, the noise at its best for
+    /// every k: searched from each of `noise`, that of the model with k and that without, for drift that k took the
+    /// place of may be there all the same.
     ///
-    /// On the cosine coefficients of the longest stretch, which may know less of k than all logs do: counted from its own k in its own standard deviations, as the noise of the model with k gives
-    /// them, and taken from k in those of all logs.
+    /// On the cosine coefficients of the longest stretch, which may know less of k than all logs do: counted from
+    /// its own k in its own standard deviations, as the noise of the model with k gives them, and taken from k in
+    /// those of all logs.
     fn interval(&self, line: Line, noise: [&Fit; 2]) -> Option<[f64; 2]> {
         let lines = self.stretch(line.coefficient, None).lines;
         let less = |away: f64| self.stretch(line.coefficient + away, Some(&lines));
@@ -349,7 +365,8 @@ impl Data<'_> {
     }
 }
 
-/// The maximum on the cosine coefficients, from another; and from the same with a tenth of the drift, which may be all gone.
+/// The maximum on the cosine coefficients, from another; and from the same with a tenth of the drift, which may be
+/// all gone.
 fn best_noise(data: &Ordinates, from: &Fit) -> Option<Fit> {
     let lower = from.form.roles().into_iter().zip(&from.logs).map(|((piece, role), log)| {
         let drift = role == Role::Coefficient && from.form.pieces()[piece].kind().is_drift();

@@ -2,9 +2,9 @@
 //!
 //! The coefficients c_j of n samples are nearly independent N(0, S(f_j)/dt), S the sampled spectrum of the model:
 //! −ln L = ½ Σ_j [ln(2π S_j/dt) + dt (c_j − a r_j)²/S_j], a the slope of a ramp and r_j its coefficients. The slope
-//! is eliminated: a = Σ dt c r/S / Σ dt r²/S. Expected information of the log parameters: I_ik = ½ Σ_j ∂_i ln S_j ∂_k ln S_j; its
-//! inverse is the Cramér-Rao bound.
-//! Sources: Whittle 1953; Kay 1993, section 3.11 (asymptotic bound).
+//! is eliminated: a = Σ dt c r/S / Σ dt r²/S. Expected information of the log parameters: I_ik = ½ Σ_j ∂_i ln S_j
+//! ∂_k ln S_j; its inverse is the Cramér-Rao bound. Sources: Whittle 1953; Kay 1993, section 3.11 (asymptotic
+//! bound).
 
 use nalgebra::{DMatrix, DVector};
 
@@ -20,8 +20,9 @@ const SHORTEST: f64 = 0.3;
 const SHORTEST_DRIFT: f64 = 2.0;
 /// A Gauss-Markov process that forgets within so many samples is a matter of the sensor's bandwidth, not drift.
 pub(super) const FAST: f64 = 10.0;
-/// Beside a band limit a drift that forgets sooner is part of the filter; a line may be as wide as what is no drift elsewhere, [`FAST`]: what is not allowed to be one wide line
-/// becomes several, each as wide as it may be. That a filter's own resonance is no line is a matter of cost.
+/// Beside a band limit a drift that forgets sooner is part of the filter; a line may be as wide as what is no drift
+/// elsewhere, [`FAST`]: what is not allowed to be one wide line becomes several, each as wide as it may be. That a
+/// filter's own resonance is no line is a matter of cost.
 pub(super) const WIDE_LINE: f64 = 30.0;
 /// And at most so many lengths of the log; beyond it a Gauss-Markov process is a random walk.
 const LONGEST: f64 = 10.0;
@@ -293,7 +294,8 @@ pub(super) fn log_likelihood(data: &Ordinates, form: &Form, logs: &[f64]) -> f64
     -objective(data, form, logs, &Held::nothing(data, form), None)
 }
 
-/// Bounds of the logarithms; a line stays where the bins are as fine as around its start, and no narrower than they are.
+/// Bounds of the logarithms; a line stays where the bins are as fine as around its start, and no narrower than they
+/// are.
 pub(super) fn bounds(data: &Ordinates, form: &Form, start: &[f64]) -> Vec<(f64, f64)> {
     let limited = form.has(Kind::BandLimit);
     let least = if limited { [FAST, WIDE_LINE] } else { [SHORTEST, SHORTEST_DRIFT] };
@@ -326,8 +328,9 @@ pub(super) fn bounds(data: &Ordinates, form: &Form, start: &[f64]) -> Vec<(f64, 
     form.split(start).flat_map(of).collect()
 }
 
-/// The same around a place, as wide as to hold it: a line that has moved on to wider bins than those around its start is narrower than what would be searched
-/// there, and a search from it that begins with another correlation time begins lower.
+/// The same around a place, as wide as to hold it: a line that has moved on to wider bins than those around its
+/// start is narrower than what would be searched there, and a search from it that begins with another correlation
+/// time begins lower.
 fn bounds_around(data: &Ordinates, form: &Form, logs: &[f64]) -> Vec<(f64, f64)> {
     let wide = |((low, high), at): ((f64, f64), &f64)| (low.min(*at), high.max(*at));
     bounds(data, form, logs).into_iter().zip(logs).map(wide).collect()
@@ -425,9 +428,9 @@ pub(super) fn climb_within(
     best.is_finite().then(|| finish(data, form, at, best, free, bounds))
 }
 
-/// Steps of Fisher's scoring, damped (Levenberg 1944, Marquardt 1963), until another would gain less than [`SCORED`]: coefficients of a filter go together as no
-/// search that has to learn it from slopes can know. How far it is from the end is told by the decrement.
-/// Not `optimize::minimize`, which would have to learn them.
+/// Steps of Fisher's scoring, damped (Levenberg 1944, Marquardt 1963), until another would gain less than
+/// [`SCORED`]: coefficients of a filter go together as no search that has to learn it from slopes can know. How far
+/// it is from the end is told by the decrement. Not `optimize::minimize`, which would have to learn them.
 fn scoring(data: &Ordinates, form: &Form, at: &mut [f64], held: &Held, free: &[usize], bounds: &[(f64, f64)]) {
     let mut damping = 1e-2;
     let mut value = objective(data, form, at, held, None);

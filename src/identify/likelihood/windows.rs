@@ -1,8 +1,9 @@
 //! A log that is too long to be held at once: the likelihoods of its windows, multiplied.
 //!
-//! All windows have the same length, so their coefficients have the same frequencies and the same bins, and
-//! ln L = Σ_w Σ_j −½ [ln 2πS(f_j)/dt + c²_wj dt/S(f_j)] needs of each bin only its count and its power over all windows (Whittle 1953; Bartlett
-//! 1948 for the average of periodograms). Each window has its own mean; windows count as independent, and what is slower than a window is not seen.
+//! All windows have the same length, so their coefficients have the same frequencies and the same bins, and ln L =
+//! Σ_w Σ_j −½ [ln 2πS(f_j)/dt + c²_wj dt/S(f_j)] needs of each bin only its count and its power over all windows
+//! (Whittle 1953; Bartlett 1948 for the average of periodograms). Each window has its own mean; windows count as
+//! independent, and what is slower than a window is not seen.
 
 use super::super::tails::{MOST_SEGMENTS, SEGMENT};
 use super::hold::Hold;
@@ -14,7 +15,8 @@ use crate::units::Unit;
 /// Groups of windows that are held apart at most, at least half of it once there are as many.
 const GROUPS: usize = 96;
 
-/// What is kept of the windows of one axis: groups of as many neighbours each, a few hundred bins a group, however many windows there are.
+/// What is kept of the windows of one axis: groups of as many neighbours each, a few hundred bins a group, however
+/// many windows there are.
 #[derive(Clone, Debug)]
 pub struct Windows {
     name: String,
@@ -34,7 +36,8 @@ pub struct Windows {
 }
 
 impl Windows {
-    /// For windows of so many samples of period `dt` (s); `display` is the unit of the log, in whose family results are written.
+    /// For windows of so many samples of period `dt` (s); `display` is the unit of the log, in whose family results
+    /// are written.
     pub fn new(name: &str, samples: usize, dt: f64, display: &Unit) -> Windows {
         let curve = Pooled::new(Deviation::Oadev, samples, dt, TauGrid::Log(super::POINTS_PER_DECADE));
         Windows {
@@ -95,8 +98,8 @@ impl Windows {
         self.count == 0
     }
 
-    /// Terms chosen, parameters and intervals as from a log held at once, but for the last step on the exact likelihood. What is held out is the
-    /// last third of the groups. Fails without a window.
+    /// Terms chosen, parameters and intervals as from a log held at once, but for the last step on the exact
+    /// likelihood. What is held out is the last third of the groups. Fails without a window.
     pub fn identify(self, choice: &ModelChoice, holds: &[Hold]) -> Result<Identified, IdentifyError> {
         let Windows { name, display, dt, groups, count, level, curve, beginnings, .. } = self;
         let Some(data) = Ordinates::pooled(&groups) else {

@@ -40,8 +40,9 @@ impl Words<'_> {
             .collect()
     }
 
-    /// Parameters of lines without a limit: of those that are as narrow as the log is long how long their correlation times are at least (their σ has no upper limit for
-    /// that reason), of those that are as wide as is searched that they are.
+    /// Parameters of lines without a limit: of those that are as narrow as the log is long how long their
+    /// correlation times are at least (their σ has no upper limit for that reason), of those that are as wide as is
+    /// searched that they are.
     pub(super) fn open_lines(&self, fit: &Fit, known: &[Precision]) -> Vec<NotIdentified> {
         let roles = fit.form.roles();
         let line = |i: &usize| fit.form.pieces()[roles[*i].0] == Piece::Oscillation;

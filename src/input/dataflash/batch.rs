@@ -1,9 +1,10 @@
 //! Batches of raw samples of one sensor at its full rate (IMU batch sampling).
 //!
-//! Source: ArduPilot, libraries/AP_InertialSensor/BatchSampler.cpp. `ISBH` opens a batch: sensor, multiplier, number of samples, time
-//! of the first one, and the sample rate that was measured. Each `ISBD` then has 32 samples as 16-bit numbers, which are the SI value
-//! × multiplier, cut towards zero; its `seqno` says which 32. Sample k of a batch is at `SampleUS` + k 10⁶/`smp_rate` in microseconds.
-//! One sensor is sampled after the other, so that its batches have gaps between them.
+//! Source: ArduPilot, libraries/AP_InertialSensor/BatchSampler.cpp. `ISBH` opens a batch: sensor, multiplier, number
+//! of samples, time of the first one, and the sample rate that was measured. Each `ISBD` then has 32 samples as
+//! 16-bit numbers, which are the SI value × multiplier, cut towards zero; its `seqno` says which 32. Sample k of a
+//! batch is at `SampleUS` + k 10⁶/`smp_rate` in microseconds. One sensor is sampled after the other, so that its
+//! batches have gaps between them.
 
 use super::{Form, Number, Split};
 use crate::input::names::Head;

@@ -10,7 +10,8 @@ thread_local! {
     static GUARDED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// What the work returns, or `None` if it panics. The hook that prints panics is passed over for this thread during the work, and for nothing else.
+/// What the work returns, or `None` if it panics. The hook that prints panics is passed over for this thread during
+/// the work, and for nothing else.
 pub(super) fn guarded<T>(work: impl FnOnce() -> T) -> Option<T> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {

@@ -16,8 +16,8 @@ use super::thrift;
 use crate::input::account::{Account, Excess, Loan};
 use crate::input::bytes::zstd;
 
-/// The file of the pages. Reading on at its end is an error here: the crate passes over the elements of a damaged header one by one, as many as
-/// it declares, also where there are none left.
+/// The file of the pages. Reading on at its end is an error here: the crate passes over the elements of a damaged
+/// header one by one, as many as it declares, also where there are none left.
 pub(super) struct Disk(pub(super) File);
 
 /// Reads up to the end of the file, and no further.

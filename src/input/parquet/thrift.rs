@@ -1,6 +1,7 @@
-//! The records of a Parquet file (Thrift's compact protocol) before the crate `parquet` reads them: it passes over the elements of a list one
-//! by one, as many as are declared, and truth values take no bytes there. What declares more of them than the record has bytes is damaged. It goes
-//! down the tree of columns by recursion, and makes room for the children that a group declares and for each whole path: these are looked at before.
+//! The records of a Parquet file (Thrift's compact protocol) before the crate `parquet` reads them: it passes over
+//! the elements of a list one by one, as many as are declared, and truth values take no bytes there. What declares
+//! more of them than the record has bytes is damaged. It goes down the tree of columns by recursion, and makes room
+//! for the children that a group declares and for each whole path: these are looked at before.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -11,7 +12,8 @@ use crate::input::bytes::{Bytes, Short};
 /// What the crate makes of a record, and of an element of a list, about.
 const RECORD: u64 = 512;
 const ELEMENT: u64 = 16;
-/// Bytes in which the header of a page is sought, few at first: pages may be many and small. One that is longer is left to the crate.
+/// Bytes in which the header of a page is sought, few at first: pages may be many and small. One that is longer is
+/// left to the crate.
 const HEADER: [u64; 2] = [1 << 9, 1 << 16];
 
 /// Why the crate does not get to see a record.
@@ -136,8 +138,8 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
-    /// The tree of columns, as a list in which a node stands before its children: the fourth field of a node is its name, the fifth the
-    /// number of its children.
+    /// The tree of columns, as a list in which a node stands before its children: the fourth field of a node is its
+    /// name, the fifth the number of its children.
     fn columns(&mut self) -> Result<(), Fault> {
         let (kind, mut left) = self.list()?;
         // children that are still to come, and bytes of the path, from the root down
@@ -240,7 +242,8 @@ fn read(mut file: &File, at: u64, most: u64) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-/// The table of contents at the end of the file, whose length stands before the signature: what the crate will need for it is held.
+/// The table of contents at the end of the file, whose length stands before the signature: what the crate will need
+/// for it is held.
 pub(super) fn contents(file: &File, account: &Account) -> Result<(), Refusal> {
     let length = file.metadata().map_or(0, |file| file.len());
     let declared = length.checked_sub(8).and_then(|at| read(file, at, 4));
@@ -283,7 +286,8 @@ mod tests {
 
     #[test]
     fn records_are_passed_over_whatever_is_in_them() {
-        // fields 1: i32, 2: text, 3: i32 -3, 4: list of two i64, 5: map of a byte to a truth value, 6: record with a double, 7: true
+        // fields 1: i32, 2: text, 3: i32 -3, 4: list of two i64, 5: map of a byte to a truth value, 6: record with a
+        // double, 7: true
         let mut bytes = vec![0x15, 0x80, 0x01, 0x18, 2, b'a', b'b', 0x15, 5, 0x19, 0x26, 1, 0x82, 3];
         bytes.extend([0x1b, 1, 0x31, 9, 0x1c, 0x17, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x11, 0]);
         let length = bytes.len() as u64;

@@ -1,5 +1,5 @@
-//! A text log in chunks of whole lines, parsed on all threads; a thread parses what it has just read, which is then in its cache. Order and
-//! numbers do not depend on how many threads there are, nor on where the chunks end.
+//! A text log in chunks of whole lines, parsed on all threads; a thread parses what it has just read, which is then
+//! in its cache. Order and numbers do not depend on how many threads there are, nor on where the chunks end.
 
 use std::collections::VecDeque;
 use std::io::{BufRead, ErrorKind};

@@ -1,8 +1,9 @@
 //! Decimal numbers from text, eight digits at a time, each rounded to the nearest f64 (ties to even) like `str::parse`.
 //!
-//! A number is m·10^e with an integer m of at most 64 bits. Where m ≤ 2^53 and |e| ≤ 22 both m and 10^|e| are exact in f64, so one
-//! division or product is correctly rounded (Clinger 1990, "How to read floating point numbers accurately"). Otherwise, for |e| ≤ 27,
-//! 5^|e| fits into 64 bits, so m·5^e or the first 62 bits of m/5^|e| and whether anything follows are found in integers and rounded once.
+//! A number is m·10^e with an integer m of at most 64 bits. Where m ≤ 2^53 and |e| ≤ 22 both m and 10^|e| are exact
+//! in f64, so one division or product is correctly rounded (Clinger 1990, "How to read floating point numbers
+//! accurately"). Otherwise, for |e| ≤ 27, 5^|e| fits into 64 bits, so m·5^e or the first 62 bits of m/5^|e| and
+//! whether anything follows are found in integers and rounded once.
 
 /// Bytes that must stand before a digit that is read.
 pub(super) const LEAD: usize = 32;
@@ -163,8 +164,9 @@ impl Bytes for pulp::x86::V3 {
     }
 }
 
-/// The last `count` (at most 8) bytes before `end`, which are digits, as a number. The digits stand in one word, the last in its highest
-/// byte; neighbours are joined to numbers of 2, 4 and 8 digits (Lemire 2021, "Number parsing at a gigabyte per second", section 6).
+/// The last `count` (at most 8) bytes before `end`, which are digits, as a number. The digits stand in one word, the
+/// last in its highest byte; neighbours are joined to numbers of 2, 4 and 8 digits (Lemire 2021, "Number parsing at
+/// a gigabyte per second", section 6).
 #[inline(always)]
 pub(super) fn eight(text: &[u8], end: usize, count: usize) -> u64 {
     const KEEP: [u64; 9] = [0, !0 << 56, !0 << 48, !0 << 40, !0 << 32, !0 << 24, !0 << 16, !0 << 8, !0];
@@ -193,7 +195,8 @@ pub(super) fn inexact(m: u64, count: usize) -> f64 {
     wide(m, -(count as i32)).unwrap_or(f64::NAN)
 }
 
-/// A number of at most 19 digits after leading zeros, with or without sign, point and exponent; `None` for anything else.
+/// A number of at most 19 digits after leading zeros, with or without sign, point and exponent; `None` for anything
+/// else.
 pub(super) fn number(field: &[u8], decimal_comma: bool) -> Option<f64> {
     let point = if decimal_comma { b',' } else { b'.' };
     let (negative, text) = signed(field);
@@ -282,7 +285,8 @@ fn wide(m: u64, e: i32) -> Option<f64> {
     Some(rounded(quotient, quotient * divisor != dividend, e - shift as i32))
 }
 
-/// (q + a part of one if `more`)·2^e, rounded to the nearest, ties to even. With q ≥ 2^54 if `more`, and a normal result.
+/// (q + a part of one if `more`)·2^e, rounded to the nearest, ties to even. With q ≥ 2^54 if `more`, and a normal
+/// result.
 fn rounded(q: u128, more: bool, e: i32) -> f64 {
     let drop = (128 - q.leading_zeros()).saturating_sub(53);
     let kept = (q >> drop) as u64;

@@ -1,8 +1,8 @@
 //! Eight fields of a text log at once, one in each 64-bit lane, for processors with 512-bit registers.
 //!
-//! A field stands in three words, its last byte in the highest byte of the first one. The digits behind the point are what is left of the
-//! words when the lower bytes are cleared; the digits before it are brought to the same place by shifts. Neighbours are joined to numbers
-//! of 2, 4 and 8 digits as in `digits::eight`.
+//! A field stands in three words, its last byte in the highest byte of the first one. The digits behind the point
+//! are what is left of the words when the lower bytes are cleared; the digits before it are brought to the same
+//! place by shifts. Neighbours are joined to numbers of 2, 4 and 8 digits as in `digits::eight`.
 
 use super::digits::{Bytes, Eight, Numbers};
 use pulp::x86::V4;

@@ -1,7 +1,8 @@
-//! Many lines of a text log at once, column by column, where all lines of a piece are alike: every one has a field for each column, no quotes.
+//! Many lines of a text log at once, column by column, where all lines of a piece are alike: every one has a field
+//! for each column, no quotes.
 //!
-//! A field that is not a plain number is handed to [`sniff::number`], and the lines of a piece that are not alike to [`Form::take`], so that
-//! every form is read, and refused, as the plain way does it.
+//! A field that is not a plain number is handed to [`sniff::number`], and the lines of a piece that are not alike to
+//! [`Form::take`], so that every form is read, and refused, as the plain way does it.
 
 use super::super::Rows;
 use super::super::sniff::{self, Delimiter};

@@ -409,7 +409,8 @@ fn table(path: &Path, chunk: Option<usize>) -> (Read, Option<String>) {
     }
 }
 
-/// A long log with something wrong in it, plain and compressed: the same rows and the same message, for any number of threads.
+/// A long log with something wrong in it, plain and compressed: the same rows and the same message, for any number
+/// of threads.
 #[test]
 fn tables_are_refused_alike() {
     let folder = tempfile::tempdir().unwrap();

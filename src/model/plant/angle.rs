@@ -5,7 +5,8 @@ use nalgebra::{DMatrix, DVector};
 use super::{ModelError, Plant, measured, named, positive};
 use crate::units::Quantity;
 
-/// State "angle" (rad), input "angular_rate" (rad/s, held over the sample), output "angle"; θ_0 ~ N(0, `initial_std_dev`²).
+/// State "angle" (rad), input "angular_rate" (rad/s, held over the sample), output "angle"; θ_0 ~ N(0,
+/// `initial_std_dev`²).
 ///
 /// Errors: `dt` (s) or `initial_std_dev` (rad) not greater than zero.
 pub fn plant(initial_std_dev: f64, dt: f64) -> Result<Plant, ModelError> {

@@ -1,7 +1,8 @@
 //! What is measured beside the sensor's own errors: the plant. One file per plant.
 //!
-//! A plant is x_{k+1} = F x_k + G u_k + v, y_k = H x_k with named states, inputs and outputs. A sensor is joined to an input
-//! (the filter integrates what it measures) or to an output (the filter compares what it measures) by [`augment`](super::augment()).
+//! A plant is x_{k+1} = F x_k + G u_k + v, y_k = H x_k with named states, inputs and outputs. A sensor is joined to
+//! an input (the filter integrates what it measures) or to an output (the filter compares what it measures) by
+//! [`augment`](super::augment()).
 
 pub mod angle;
 pub mod custom;
@@ -29,7 +30,8 @@ pub struct Plant {
     pub p0: DMatrix<f64>,
 }
 
-/// The sensor rests: its true signal is zero, the measurement is the sum of its errors (seed paper, equation 2). No states.
+/// The sensor rests: its true signal is zero, the measurement is the sum of its errors (seed paper, equation 2). No
+/// states.
 pub fn at_rest(quantity: Quantity, dt: f64) -> Plant {
     Plant {
         dt,

@@ -1,4 +1,5 @@
-//! Roll or pitch: the gyro is integrated, gravity along the accelerometer's axis tells the tilt, f = g θ for small tilts.
+//! Roll or pitch: the gyro is integrated, gravity along the accelerometer's axis tells the tilt, f = g θ for small
+//! tilts.
 
 use nalgebra::dmatrix;
 

@@ -18,18 +18,21 @@ use crate::units::{Dimension, Quantity};
 #[serde(deny_unknown_fields, default)]
 #[command(next_help_heading = "Plant")]
 pub struct PlantFlags {
-    /// What the sensor is part of: static, angle, rate, vertical, attitude, or a design FILE.json [default: the design of the parameters, else static]
+    /// What the sensor is part of: static, angle, rate, vertical, attitude, or a design FILE.json [default: the
+    /// design of the parameters, else static]
     #[arg(long, value_name = "PLANT")]
     pub plant: Option<String>,
     #[allow(rustdoc::broken_intra_doc_links, reason = "it is the help of a flag, too")]
-    /// A measurement of the plant: "[NAME:] SIGMA [@ RATE] [, SIGMA over TIME]", for example "heading: 2 deg @ 1 Hz, 1 deg over 60 s"; or
-    /// its column in the logs, as in replay: heading=yaw:deg
+    /// A measurement of the plant: "[NAME:] SIGMA [@ RATE] [, SIGMA over TIME]", for example "heading: 2 deg @ 1 Hz,
+    /// 1 deg over 60 s"; or its column in the logs, as in replay: heading=yaw:deg
     #[arg(long, value_name = "AID")]
     pub aid: Vec<String>,
-    /// Plant rate: "SIGMA over TIME" for a Gauss-Markov rate, or the density of an integrated random walk, such as "5 deg/s^2/sqrt(s)"
+    /// Plant rate: "SIGMA over TIME" for a Gauss-Markov rate, or the density of an integrated random walk, such as
+    /// "5 deg/s^2/sqrt(s)"
     #[arg(long, value_name = "MOTION")]
     pub motion: Option<String>,
-    /// Plants vertical and attitude: noise parameters of the accelerometer, FILE or FILE:AXIS; of several axes attitude takes the noisiest
+    /// Plants vertical and attitude: noise parameters of the accelerometer, FILE or FILE:AXIS; of several axes
+    /// attitude takes the noisiest
     #[arg(long, value_name = "PARAMS")]
     pub accelerometer: Option<String>,
 }

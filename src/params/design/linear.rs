@@ -21,8 +21,9 @@ pub(super) fn is_linear(value: &Value) -> bool {
     value.get("format").and_then(Value::as_str) == Some(LINEAR_FORMAT)
 }
 
-/// The plant whose rate `sensor` (q, p or r) the gyro measures: states of its model, controls as known inputs, every state an output, driven by white gusts of
-/// 1 m/s/√Hz along each axis (light turbulence at low frequencies). Errors: a rate that no model has, or a document without its parts.
+/// The plant whose rate `sensor` (q, p or r) the gyro measures: states of its model, controls as known inputs, every
+/// state an output, driven by white gusts of 1 m/s/√Hz along each axis (light turbulence at low frequencies).
+/// Errors: a rate that no model has, or a document without its parts.
 pub(super) fn linear(place: &Place<'_>, sensor: &str) -> Result<Design, KeyError> {
     let Some((_, name)) = RATES.iter().find(|(rate, _)| *rate == sensor) else {
         return Err(place.error(format!("'{sensor}' is no rate of a linear model; known are q, p, r")));

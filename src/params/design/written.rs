@@ -79,8 +79,8 @@ struct DriftDocument {
     correlation_time: Measured,
 }
 
-/// continuous: dx/dt = A x + B u + G w, w white of unit two-sided density; discrete: x(k+1) = A x(k) + B u(k) + G w(k), w ~ N(0, I);
-/// y = H x. SI numbers, row by row.
+/// continuous: dx/dt = A x + B u + G w, w white of unit two-sided density; discrete: x(k+1) = A x(k) + B u(k) + G
+/// w(k), w ~ N(0, I); y = H x. SI numbers, row by row.
 #[derive(Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "CustomPlant")]

@@ -28,8 +28,8 @@ pub struct AttitudeError {
 }
 
 impl AttitudeError {
-    /// Of e = q̂ q_ref⁻¹, the error in the earth frame: 2 acos|w|, 2 atan|z/w|, 2 acos √(w² + z²). Near zero the sines are used, which keep
-    /// all digits.
+    /// Of e = q̂ q_ref⁻¹, the error in the earth frame: 2 acos|w|, 2 atan|z/w|, 2 acos √(w² + z²). Near zero the
+    /// sines are used, which keep all digits.
     pub fn of(estimate: &UnitQuaternion<f64>, reference: &UnitQuaternion<f64>) -> AttitudeError {
         let e = estimate * reference.inverse();
         let (w, horizontal, z) = (e.w.abs(), e.i.hypot(e.j), e.k.abs());

@@ -205,7 +205,8 @@ impl AttitudeReplayer {
         });
     }
 
-    /// Errors, rests and the verdict: consistent when the claimed 3 sigma hold the error of at least 95 % of the samples.
+    /// Errors, rests and the verdict: consistent when the claimed 3 sigma hold the error of at least 95 % of the
+    /// samples.
     pub fn finish(mut self) -> AttitudeReplay {
         self.close();
         let axes = self.design.axes.each_ref().map(String::as_str);

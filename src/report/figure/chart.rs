@@ -412,7 +412,8 @@ fn band_pieces(edges: &[(f64, f64, f64)], x: &Scale, y: &Scale) -> Vec<(Edge, Ed
     pieces
 }
 
-/// First, smallest, largest and last point of each of [`COLUMNS`] stretches of a long line: what the eye would see of it.
+/// First, smallest, largest and last point of each of [`COLUMNS`] stretches of a long line: what the eye would see
+/// of it.
 fn thin(points: Vec<(f64, f64)>, x: &Scale) -> Vec<(f64, f64)> {
     if points.len() <= 4 * COLUMNS {
         return points;

@@ -8,7 +8,8 @@ use super::trace::Clock;
 /// Stretches that a figure shows at most: more than it has pixels.
 const STRETCHES: usize = 1200;
 
-/// Lines of any length in bounded memory: of every stretch the least and the greatest value with their times, so that no spike is lost.
+/// Lines of any length in bounded memory: of every stretch the least and the greatest value with their times, so
+/// that no spike is lost.
 #[derive(Clone, Debug, Default)]
 pub struct Envelope {
     /// Rows in a stretch.

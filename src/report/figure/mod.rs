@@ -1,7 +1,8 @@
 //! Figures as self-contained SVG: plain data in, one string out.
 //!
-//! Text stays text in generic fonts, colours follow the reader's light or dark setting, series differ by line style as well as by colour,
-//! and the same data give the same bytes. Values that are not finite, or not positive on a logarithmic axis, leave a gap.
+//! Text stays text in generic fonts, colours follow the reader's light or dark setting, series differ by line style
+//! as well as by colour, and the same data give the same bytes. Values that are not finite, or not positive on a
+//! logarithmic axis, leave a gap.
 
 mod allan;
 mod budget;

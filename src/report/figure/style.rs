@@ -1,8 +1,8 @@
 //! The look: colours, line styles and type, light and dark, and the pass that turns plotters' output into styled SVG.
 //!
-//! plotters writes a colour into every element. A figure that follows the reader's light or dark setting needs classes instead, so each
-//! [`Class`] is drawn in a colour that is only a number, and [`document`] replaces that colour, with the presentation attributes beside
-//! it, by the class.
+//! plotters writes a colour into every element. A figure that follows the reader's light or dark setting needs
+//! classes instead, so each [`Class`] is drawn in a colour that is only a number, and [`document`] replaces that
+//! colour, with the presentation attributes beside it, by the class.
 
 use plotters::style::RGBColor;
 
@@ -52,7 +52,8 @@ const PLAIN: [Class; 10] = [
 
 /// Distinct series; further ones start again.
 const SERIES: usize = 6;
-/// Blue, vermilion, green, purple, ochre, grey: distinct for the common colour-vision types, with distinct dashes beside.
+/// Blue, vermilion, green, purple, ochre, grey: distinct for the common colour-vision types, with distinct dashes
+/// beside.
 const LIGHT: [&str; SERIES] = ["#1d5fa6", "#c0491a", "#1a7a56", "#82489a", "#8a6900", "#5b636b"];
 const DARK: [&str; SERIES] = ["#7fb4f0", "#f2996a", "#5fc9a1", "#cba2e0", "#dcb94c", "#a3acb5"];
 const DASHES: [&str; SERIES] = ["none", "60 32", "18 22", "90 28 18 28", "130 40", "50 22 18 22 18 22"];
@@ -216,7 +217,8 @@ pub(super) fn printable(c: char) -> char {
     if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') { ' ' } else { c }
 }
 
-/// Width of a text in figure units, from average letter widths of sans-serif type (within 15 % of common fonts, on the wide side).
+/// Width of a text in figure units, from average letter widths of sans-serif type (within 15 % of common fonts, on
+/// the wide side).
 pub(super) fn text_width(text: &str, size: i32) -> i32 {
     let ems: f64 = text
         .chars()

@@ -120,7 +120,8 @@ pub fn estimate(data: &Estimate) -> String {
     chart.render()
 }
 
-/// Normalised innovations. For a long recording each entry is a stretch with its extremes; for a short one `lower == upper`.
+/// Normalised innovations. For a long recording each entry is a stretch with its extremes; for a short one `lower ==
+/// upper`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Innovations {
     pub title: String,

@@ -1,17 +1,18 @@
 //! One axis: NaN, stuck and saturated values, quantisation, outliers, motion.
 //!
 //! Rules, for the values of a rate or of increments, and for the differences of an integral:
-//! - *Outlier*: in windows of 1000 samples, further than 8 robust standard deviations (1.4826 × median absolute deviation)
-//!   from the window's median. A window with more than 1 % of such values is not an accident but motion.
-//! - *Stuck*: a run of equal values so long that, with the share p of repeats in this log, chance would make one in less
-//!   than 1 of 10⁶ such logs (p^(length − 1) · n < 10⁻⁶), and at least 4.
-//! - *Saturated*: the extreme value occurs at least 5 times, over 3 times as often as the next value inside, and lies more
-//!   than 2 robust standard deviations from the median.
-//! - *Quantised*: 99 % of the distances between neighbouring distinct values are multiples (within 5 %) of one step, and the
-//!   step is at least 1 % of the noise.
-//! - *Motion*: standard deviation in windows (64 samples or more), as the mean distance from the mean tells it, over 3 times its median and over what
-//!   correlated noise, whose windows differ as much as their calmer half says, reaches in one of 10⁶ logs; or the means of the windows
-//!   spread (5 % to 95 %) over more than 3 deg/s or 0.5 m/s²; or a mean rate above 25 deg/s.
+//! - *Outlier*: in windows of 1000 samples, further than 8 robust standard deviations (1.4826 × median absolute
+//!   deviation) from the window's median. A window with more than 1 % of such values is not an accident but motion.
+//! - *Stuck*: a run of equal values so long that, with the share p of repeats in this log, chance would make one in
+//!   less than 1 of 10⁶ such logs (p^(length − 1) · n < 10⁻⁶), and at least 4.
+//! - *Saturated*: the extreme value occurs at least 5 times, over 3 times as often as the next value inside, and
+//!   lies more than 2 robust standard deviations from the median.
+//! - *Quantised*: 99 % of the distances between neighbouring distinct values are multiples (within 5 %) of one step,
+//!   and the step is at least 1 % of the noise.
+//! - *Motion*: standard deviation in windows (64 samples or more), as the mean distance from the mean tells it, over
+//!   3 times its median and over what correlated noise, whose windows differ as much as their calmer half says,
+//!   reaches in one of 10⁶ logs; or the means of the windows spread (5 % to 95 %) over more than 3 deg/s or 0.5
+//!   m/s²; or a mean rate above 25 deg/s.
 
 use std::collections::BTreeMap;
 
@@ -504,12 +505,15 @@ impl AxisCheck {
     }
 }
 
-/// The largest of so many windows' variances over their median that correlated normal noise reaches by chance in one of 10⁶ logs; `quartile`: the
-/// lower one over the median. A window has as many degrees of freedom ν as make its quartile what it is (Welch 1938, Satterthwaite 1946); the upper half, in which motion would be, is
-/// not looked at. The variance is a weighted sum of squares, of which the largest weight is at most 1/√ν of all, and it is that which makes the tail: χ²₁/√ν.
+/// The largest of so many windows' variances over their median that correlated normal noise reaches by chance in one
+/// of 10⁶ logs; `quartile`: the lower one over the median. A window has as many degrees of freedom ν as make its
+/// quartile what it is (Welch 1938, Satterthwaite 1946); the upper half, in which motion would be, is not looked at.
+/// The variance is a weighted sum of squares, of which the largest weight is at most 1/√ν of all, and it is that
+/// which makes the tail: χ²₁/√ν.
 fn largest_by_chance(quartile: f64, windows: usize) -> f64 {
     let ratio = |dof: f64| chi_square_quantile(0.25, dof) / chi_square_quantile(0.5, dof);
-    // the ratio grows with the degrees of freedom; of the white noise of 64 samples it is 0.89, and one sinusoid that comes and goes has one
+    // the ratio grows with the degrees of freedom; of the white noise of 64 samples it is 0.89, and one sinusoid
+    // that comes and goes has one
     if quartile.is_nan() || quartile >= ratio(MANY) {
         return 0.0;
     }
@@ -521,7 +525,8 @@ fn are<'a>(count: u64, one: &'a str, many: &'a str) -> &'a str {
     if count == 1 { one } else { many }
 }
 
-/// The step of which all values are multiples, apart from an offset and from rounding in print; `None` if there is none.
+/// The step of which all values are multiples, apart from an offset and from rounding in print; `None` if there is
+/// none.
 fn quantisation_step(sample: &mut [f64]) -> Option<f64> {
     sample.sort_unstable_by(f64::total_cmp);
     let spread = quantile(sample, 0.75) - quantile(sample, 0.25);

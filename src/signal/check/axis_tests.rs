@@ -28,8 +28,8 @@ fn only(values: &[f64], kind: FindingKind) -> (u64, u64, bool) {
     (note.count, note.first.map_or(0, |p| p.index), note.serious)
 }
 
-// A window's threshold of 8 robust sigma: below 1e-14 per sample, so below 1e-8 for all samples of these tests; the other
-// rules are further away still.
+// A window's threshold of 8 robust sigma: below 1e-14 per sample, so below 1e-8 for all samples of these tests; the
+// other rules are further away still.
 #[test]
 fn white_noise_with_a_slow_drift_has_nothing_to_say() {
     let mut x = noise(100_000, 0.1 * DEG, 0);
@@ -117,8 +117,10 @@ fn low_passed(n: usize, pole: f64, axis: u32) -> Vec<f64> {
     all.skip(settle).collect()
 }
 
-/// Correlated noise and noise with outliers scatter from window to window, and are at rest all the same: poles of up to 0.99, 1 % of samples of ten times the spread. The rule is
-/// made for 1 of 10⁶ logs; that the variance of a window has a chi-square law is an approximation, so that none of 60 is what is asked. A burst of thirty times the noise is found in each.
+/// Correlated noise and noise with outliers scatter from window to window, and are at rest all the same: poles of up
+/// to 0.99, 1 % of samples of ten times the spread. The rule is made for 1 of 10⁶ logs; that the variance of a
+/// window has a chi-square law is an approximation, so that none of 60 is what is asked. A burst of thirty times the
+/// noise is found in each.
 #[test]
 fn low_passed_noise_and_outliers_are_no_motion() {
     let moves = |x: &[f64]| kinds(x).contains(&FindingKind::Motion);

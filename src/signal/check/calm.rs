@@ -1,8 +1,9 @@
 //! The longest part of a moving log in which it is as calm as it ever is.
 //!
-//! An axis at its calmest: the smallest standard deviation that [`TOGETHER`] consecutive windows keep, none of which stands still. A window is calm if it does not stand still and its own is at most [`NEAR`] times that, its
-//! mean is within as much of that of a calm window before it, and it does not turn fast. The part is calm on every axis, and a window shorter on a side that ends in motion:
-//! motion may have begun there.
+//! An axis at its calmest: the smallest standard deviation that [`TOGETHER`] consecutive windows keep, none of which
+//! stands still. A window is calm if it does not stand still and its own is at most [`NEAR`] times that, its mean is
+//! within as much of that of a calm window before it, and it does not turn fast. The part is calm on every axis, and
+//! a window shorter on a side that ends in motion: motion may have begun there.
 
 use std::ops::Range;
 
@@ -14,8 +15,8 @@ use crate::numerics::reduce::Moments;
 const TOGETHER: usize = 5;
 /// Twice as many: any few windows are calm by their own measure.
 const SHORTEST: u64 = 10;
-/// Of 64 normal samples the standard deviation is within 1.5 times the usual one but in 1 of 10⁶; correlated ones scatter more. The log check calls a window of three
-/// times the usual one motion.
+/// Of 64 normal samples the standard deviation is within 1.5 times the usual one but in 1 of 10⁶; correlated ones
+/// scatter more. The log check calls a window of three times the usual one motion.
 const NEAR: f64 = 2.0;
 
 /// One axis as it is looked at.
@@ -115,7 +116,8 @@ impl AxisWindows<'_> {
         Some(moving)
     }
 
-    /// Whether these rows have values that change, and the means of their windows stay together as those of a sensor at rest.
+    /// Whether these rows have values that change, and the means of their windows stay together as those of a sensor
+    /// at rest.
     fn stays(&self, rows: &Range<u64>) -> bool {
         let within = || self.windows.done.iter().filter(|(_, place)| rows.contains(&place.index)).map(|(m, _)| m);
         let low = within().fold(f64::INFINITY, |low, m| low.min(m.mean));
@@ -179,7 +181,8 @@ mod tests {
         let [mut x, mut y] = [rest(0), rest(1)];
         shake(&mut x, 4000..5000);
         shake(&mut y, 12_500..13_500);
-        // windows of 64 samples: the first after the shaking is at 5056, the next shaken one at 12480; and one less on both sides
+        // windows of 64 samples: the first after the shaking is at 5056, the next shaken one at 12480; and one less
+        // on both sides
         assert_eq!(flags(&[x.clone(), y.clone()]), "`start` 51.2 `end` 124.1");
         shake(&mut y, 17_000..17_010);
         assert_eq!(flags(&[x.clone(), y.clone()]), "`start` 51.2 `end` 124.1");

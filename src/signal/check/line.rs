@@ -2,8 +2,8 @@
 
 const BLOCK: usize = 64;
 
-/// Least squares of time over row number: sums about the means of blocks of 64 points, joined by the formula of Chan, Golub and LeVeque
-/// (1979). How the points come, one by one or many at once, makes no difference.
+/// Least squares of time over row number: sums about the means of blocks of 64 points, joined by the formula of
+/// Chan, Golub and LeVeque (1979). How the points come, one by one or many at once, makes no difference.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Line {
     count: f64,

@@ -3,8 +3,9 @@
 /// Indices that share a hash.
 const GROUP: u64 = 64;
 
-/// An even sample of a stream of any length: an element stays if the rank of its index is high enough, and the bound rises by one whenever
-/// more than `capacity` have stayed. No clock and no random state: the same stream gives the same sample.
+/// An even sample of a stream of any length: an element stays if the rank of its index is high enough, and the bound
+/// rises by one whenever more than `capacity` have stayed. No clock and no random state: the same stream gives the
+/// same sample.
 #[derive(Clone, Debug)]
 pub(super) struct Sample {
     kept: Vec<(u32, f64)>,
@@ -14,8 +15,8 @@ pub(super) struct Sample {
     capacity: usize,
 }
 
-/// Of every 64 indices 64/2^r have at least rank r: every 2^r-th of them from a random place on; one has rank 6, and it has rank 6 + k in
-/// one of 2^k groups.
+/// Of every 64 indices 64/2^r have at least rank r: every 2^r-th of them from a random place on; one has rank 6, and
+/// it has rank 6 + k in one of 2^k groups.
 #[inline(always)]
 fn rank(index: u64) -> u32 {
     let hash = mix(index / GROUP);

@@ -1,14 +1,14 @@
 //! Time stamps: what rate they say, whether they can be trusted, where samples are missing.
 //!
 //! Rules, with T the period:
-//! - A row with the same stamp as the row before is a *repeated stamp*; the step to the next new stamp is shared among the
-//!   rows it covers.
-//! - The typical step is the middle of the two quartiles, the robust spread their distance over 1.349. The stamps are *usable*
-//!   if the spread is at most 0.35 of the typical step, and if long steps are rare (at most 2 %) or explain at most 30 % of
-//!   the time. Otherwise they are taken for host arrival times: only their mean rate is used (least-squares line through all
-//!   stamps) and no gap is inferred.
-//! - A step longer than 1.5 T is a *gap* of round(step/T) − 1 samples, unless the next step is short by as much (two steps
-//!   within 2.5 T): then one stamp was late.
+//! - A row with the same stamp as the row before is a *repeated stamp*; the step to the next new stamp is shared
+//!   among the rows it covers.
+//! - The typical step is the middle of the two quartiles, the robust spread their distance over 1.349. The stamps
+//!   are *usable* if the spread is at most 0.35 of the typical step, and if long steps are rare (at most 2 %) or
+//!   explain at most 30 % of the time. Otherwise they are taken for host arrival times: only their mean rate is used
+//!   (least-squares line through all stamps) and no gap is inferred.
+//! - A step longer than 1.5 T is a *gap* of round(step/T) − 1 samples, unless the next step is short by as much (two
+//!   steps within 2.5 T): then one stamp was late.
 //! - T is the typical step, refined to (span − gaps) / (steps outside gaps), so that it does not drift over a long log.
 
 use pulp::{Arch, NullaryFnOnce};
@@ -25,7 +25,8 @@ const STARTUP: usize = 1024;
 const LARGEST_SPREAD: f64 = 0.35;
 const RARE: f64 = 0.02;
 const LARGEST_MISSING_SHARE: f64 = 0.3;
-/// A gap is counted up to here, some years of any sensor: sums over all gaps do not overflow. Longer ones come from damaged stamps.
+/// A gap is counted up to here, some years of any sensor: sums over all gaps do not overflow. Longer ones come from
+/// damaged stamps.
 const LONGEST_GAP: u64 = 1 << 40;
 
 /// The step that ends at `place` and covers `periods` rows.
@@ -141,8 +142,9 @@ impl Stamps {
         }
     }
 
-    /// The stamps of further rows, those that are not finite left out: many at once where the steps are regular, with the same result as one
-    /// by one. The first row at which time goes back and the stamp before it, if `strict`; nothing is read beyond.
+    /// The stamps of further rows, those that are not finite left out: many at once where the steps are regular,
+    /// with the same result as one by one. The first row at which time goes back and the stamp before it, if
+    /// `strict`; nothing is read beyond.
     pub(super) fn add_all(&mut self, mut places: Places, strict: bool) -> Option<(usize, f64)> {
         const PART: usize = 512;
         let mut done = 0;

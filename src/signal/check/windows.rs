@@ -7,8 +7,8 @@ use crate::numerics::reduce::{Moments, by_eight};
 pub(super) const PIECE: usize = 64;
 const WINDOWS: usize = 4096;
 
-/// Moments of consecutive windows; neighbours are merged when there are too many. How the values come, one by one or many at once,
-/// makes no difference.
+/// Moments of consecutive windows; neighbours are merged when there are too many. How the values come, one by one or
+/// many at once, makes no difference.
 #[derive(Clone, Debug)]
 pub(super) struct Windows {
     pub(super) size: u64,
@@ -128,10 +128,11 @@ impl Windows {
     }
 }
 
-/// True only if no value is further than `bound` median absolute deviations from the median; false says nothing. With c the mean, d the
-/// largest distance from it and e = d/32: if fewer than half of the values are below c - e and fewer than half above c + e, the median lies
-/// between, and no value is further from it than d + e. If also fewer than half lie within t + e of c, the deviation is at least t; so
-/// t = (d + e)/bound is enough. A part in 10^6 is added for rounding.
+/// True only if no value is further than `bound` median absolute deviations from the median; false says nothing.
+/// With c the mean, d the largest distance from it and e = d/32: if fewer than half of the values are below c - e
+/// and fewer than half above c + e, the median lies between, and no value is further from it than d + e. If also
+/// fewer than half lie within t + e of c, the deviation is at least t; so t = (d + e)/bound is enough. A part in
+/// 10^6 is added for rounding.
 #[inline(always)]
 pub(super) fn surely_quiet(x: &[f64], bound: f64) -> bool {
     let center = by_eight(x, |v| v) / x.len() as f64;

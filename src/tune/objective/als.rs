@@ -1,8 +1,10 @@
-//! Autocovariance least squares: variances from the autocovariance of the innovations of a filter that is not the best one.
+//! Autocovariance least squares: variances from the autocovariance of the innovations of a filter that is not the
+//! best one.
 //!
-//! Of a filter with any stable gain K in a world with Q and R, Ā = F (I − K H), P = Ā P Āᵀ + Q + F K R Kᵀ Fᵀ, the innovations have
-//! C₀ = H P Hᵀ + R and C_j = H Ā^j P Hᵀ − H Ā^(j−1) F K R: linear in Q and R. The sample autocovariances are fitted by least squares.
-//! Sources: Odelson, Rajamani & Rawlings 2006, Automatica 42, 303–308; Rajamani & Rawlings 2009, Automatica 45, 142–148.
+//! Of a filter with any stable gain K in a world with Q and R, Ā = F (I − K H), P = Ā P Āᵀ + Q + F K R Kᵀ Fᵀ, the
+//! innovations have C₀ = H P Hᵀ + R and C_j = H Ā^j P Hᵀ − H Ā^(j−1) F K R: linear in Q and R. The sample
+//! autocovariances are fitted by least squares. Sources: Odelson, Rajamani & Rawlings 2006, Automatica 42, 303–308;
+//! Rajamani & Rawlings 2009, Automatica 45, 142–148.
 
 use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
@@ -55,12 +57,13 @@ pub struct Estimate {
     pub std_devs: Vec<Option<f64>>,
 }
 
-/// Sizes v ≥ 0 of `sources`, Q = Σ v Q_i and R = Σ v R_i beside a known `fixed` part, from sample autocovariances C_0 … C_N of the innovations of the
-/// filter x⁺ = F (x + K ν), made of `samples` of them.
+/// Sizes v ≥ 0 of `sources`, Q = Σ v Q_i and R = Σ v R_i beside a known `fixed` part, from sample autocovariances
+/// C_0 … C_N of the innovations of the filter x⁺ = F (x + K ν), made of `samples` of them.
 ///
-/// Least squares with weights 1/var of each entry, that of nearly white innovations: var C_j[a, b] = C₀[a, a] C₀[b, b]/samples, twice
-/// that for variances. v ≥ 0 by trying every subset of the unknowns, which is exact. Shapes: `f` n × n, `h` m × n, `gain` n × m, C_j m × m,
-/// C_j[a, b] = E[ν_a(k + j) ν_b(k)]. Errors: more than twelve unknowns, unknowns that the autocovariances do not tell apart, an unstable filter.
+/// Least squares with weights 1/var of each entry, that of nearly white innovations: var C_j[a, b] = C₀[a, a] C₀[b,
+/// b]/samples, twice that for variances. v ≥ 0 by trying every subset of the unknowns, which is exact. Shapes: `f` n
+/// × n, `h` m × n, `gain` n × m, C_j m × m, C_j[a, b] = E[ν_a(k + j) ν_b(k)]. Errors: more than twelve unknowns,
+/// unknowns that the autocovariances do not tell apart, an unstable filter.
 pub fn als(
     f: &DMatrix<f64>,
     h: &DMatrix<f64>,
@@ -163,7 +166,8 @@ pub struct AlsAxis {
     pub parameters: Vec<String>,
 }
 
-/// Sample autocovariances of the innovations after the first `first` steps of every log, and how many innovations there are.
+/// Sample autocovariances of the innovations after the first `first` steps of every log, and how many innovations
+/// there are.
 fn sample(
     problem: &Problem<'_>,
     model: &LinearModel,

@@ -89,9 +89,9 @@ impl Belief {
     }
 }
 
-/// Correlations of maximum-likelihood estimates of the parameters of an axis from a log at rest, and the numbers of these parameters: the
-/// inverse of Whittle's information I_ij ∝ ∫ ∂_i ln S ∂_j ln S df from 1/span to half the sample rate. `None` where the log would not tell
-/// them apart.
+/// Correlations of maximum-likelihood estimates of the parameters of an axis from a log at rest, and the numbers of
+/// these parameters: the inverse of Whittle's information I_ij ∝ ∫ ∂_i ln S ∂_j ln S df from 1/span to half the
+/// sample rate. `None` where the log would not tell them apart.
 fn correlations(problem: &Problem<'_>, axis: usize) -> Option<(Vec<usize>, DMatrix<f64>)> {
     let space = problem.space;
     let of_axis = |i: &usize| space.parameters[*i].axis == Some(axis);

@@ -59,7 +59,8 @@ pub struct LikelihoodLog {
 struct Search<'a> {
     problem: &'a Problem<'a>,
     group: &'a Group,
-    /// √P0 of the bias is no matter of the noise here, even where it was guessed from it: variances of constants, by axis.
+    /// √P0 of the bias is no matter of the noise here, even where it was guessed from it: variances of constants, by
+    /// axis.
     constants: Vec<Vec<(usize, f64)>>,
 }
 

@@ -1,5 +1,6 @@
-//! How the physical parameters of a design are chosen: as identified, honest under their intervals, by the likelihood of logs, by consistency
-//! under a given truth, or by autocovariance least squares. Only physical parameters move; Q, R and P0 follow from them.
+//! How the physical parameters of a design are chosen: as identified, honest under their intervals, by the
+//! likelihood of logs, by consistency under a given truth, or by autocovariance least squares. Only physical
+//! parameters move; Q, R and P0 follow from them.
 
 pub mod als;
 mod belief;
@@ -125,8 +126,8 @@ struct Found {
     std_devs: Vec<Option<f64>>,
 }
 
-/// The design of `params` with its physical parameters chosen by the objective, and how; for [`Objective::Nominal`] that of
-/// [`tune`](super::tune()) without a record.
+/// The design of `params` with its physical parameters chosen by the objective, and how; for [`Objective::Nominal`]
+/// that of [`tune`](super::tune()) without a record.
 pub fn tune_by(
     params: &Params,
     options: &TuneOptions,

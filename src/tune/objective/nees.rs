@@ -55,9 +55,9 @@ fn expected(filter: &Settled, truth: &Truth) -> Result<Expected, LinalgError> {
 
 /// The truth has the same plant and aids; the numbers of the sensor alone move.
 ///
-/// Least |δ|² with ln NEES = ln NIS = 0, δ the shifts of the logarithms, by Newton steps δ ← J⁺(J δ − r), J⁺ the pseudo-inverse; where there
-/// are fewer parameters than conditions, these in the sense of least squares. Not `optimize::minimize`: with more
-/// parameters than conditions the least |δ|² chooses among many roots.
+/// Least |δ|² with ln NEES = ln NIS = 0, δ the shifts of the logarithms, by Newton steps δ ← J⁺(J δ − r), J⁺ the
+/// pseudo-inverse; where there are fewer parameters than conditions, these in the sense of least squares. Not
+/// `optimize::minimize`: with more parameters than conditions the least |δ|² chooses among many roots.
 pub(super) fn choose(problem: &Problem<'_>, group: &Group, told: &mut Vec<NeesAxis>) -> Result<Found, ObjectiveError> {
     let truth = problem.request.truth.ok_or(ObjectiveError::NoTruth)?;
     let space = problem.space;

@@ -1,9 +1,10 @@
 //! Parameters whose claimed sigma stays honest over the identified intervals, at the least price in accuracy.
 //!
-//! A sensor is drawn with ln θ normal, the intervals its middle 95 %; where they are those of a likelihood, with the correlation that such
-//! estimates have. A filter is honest for a sensor when no steady sigma that it claims, of the states of the plant and of the whole drift, is
-//! below that of its true error, by the exact covariance of the mismatched filter. The parameters are those of least mean ln(true sigma) among
-//! those that are honest for 95 % of the sensors and within the joint 99.7 % region of what was identified (an ellipsoid of χ²).
+//! A sensor is drawn with ln θ normal, the intervals its middle 95 %; where they are those of a likelihood, with the
+//! correlation that such estimates have. A filter is honest for a sensor when no steady sigma that it claims, of the
+//! states of the plant and of the whole drift, is below that of its true error, by the exact covariance of the
+//! mismatched filter. The parameters are those of least mean ln(true sigma) among those that are honest for 95 % of
+//! the sensors and within the joint 99.7 % region of what was identified (an ellipsoid of χ²).
 
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -21,15 +22,18 @@ use crate::tune::parameters::Group;
 
 /// Share of the sensors for which the claim must hold.
 pub const HONEST_SHARE: f64 = 0.95;
-/// Sensors on which parameters are searched, on which they are made honest, and on which they are checked: sets 0, 1, 2, all different.
+/// Sensors on which parameters are searched, on which they are made honest, and on which they are checked: sets 0,
+/// 1, 2, all different.
 const SEARCHED_ON: u64 = 300;
 const CHOSEN_ON: u64 = 2000;
 const CHECKED_ON: u64 = 2000;
-/// The criterion is missed on the checked-on by bad luck, there or in the choice, with a probability of 1 %: so many standard deviations.
+/// The criterion is missed on the checked-on by bad luck, there or in the choice, with a probability of 1 %: so many
+/// standard deviations.
 const LUCK: f64 = 2.326_347_874_040_841;
 /// Probability of the region about the identified parameters in which they may move.
 const REGION: f64 = 0.9973;
-/// What a squared standard deviation of movement weighs beside ln(true sigma): it decides only where the price does not.
+/// What a squared standard deviation of movement weighs beside ln(true sigma): it decides only where the price does
+/// not.
 const TIE: f64 = 1e-4;
 /// Step of numerical derivatives, standard deviations: the quantile of some hundred sensors is rough.
 const STEP: f64 = 0.05;

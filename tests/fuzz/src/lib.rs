@@ -17,8 +17,8 @@ fn file() -> &'static PathBuf {
     })
 }
 
-/// Reads the bytes as a log, without flags and with those that files without units ask for. Bytes without the signature are not kept:
-/// they are another reader's.
+/// Reads the bytes as a log, without flags and with those that files without units ask for. Bytes without the
+/// signature are not kept: they are another reader's.
 pub fn read(signature: &[u8], bytes: &[u8]) -> Corpus {
     if !bytes.starts_with(signature) {
         return Corpus::Reject;

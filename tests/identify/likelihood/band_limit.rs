@@ -1,11 +1,13 @@
-//! Sensors behind a low-pass: the filter is found, drift stays drift, and the innovations of what was not seen are white.
+//! Sensors behind a low-pass: the filter is found, drift stays drift, and the innovations of what was not seen are
+//! white.
 
 use super::*;
 use kfdesign::noise::{Filter, Kind};
 
 use crate::support::Bench;
 
-/// Butterworth low-passes of order 1 to 3 by `scipy.signal.butter(order, 2 corner)`, and what is no Butterworth filter: sinc³ of four samples.
+/// Butterworth low-passes of order 1 to 3 by `scipy.signal.butter(order, 2 corner)`, and what is no Butterworth
+/// filter: sinc³ of four samples.
 fn filters() -> Vec<(&'static str, Filter)> {
     let of = |b: &[f64], a: &[f64]| Filter::new(b, a).unwrap();
     vec![
@@ -22,9 +24,10 @@ fn filters() -> Vec<(&'static str, Filter)> {
     ]
 }
 
-/// A tenth of a unit of white noise at 100 Hz behind each filter, the converter's own noise, and drift of 20 s. In the first 30,000 samples N is
-/// found within 4 of its standard deviations (false alarm 6.3e-5 each) and the drift is a Gauss-Markov process or a walk; the next 30,000 are white to the filter that
-/// is made of it: largest of 50 autocorrelations below 4.6/√n (2e-4 each).
+/// A tenth of a unit of white noise at 100 Hz behind each filter, the converter's own noise, and drift of 20 s. In
+/// the first 30,000 samples N is found within 4 of its standard deviations (false alarm 6.3e-5 each) and the drift
+/// is a Gauss-Markov process or a walk; the next 30,000 are white to the filter that is made of it: largest of 50
+/// autocorrelations below 4.6/√n (2e-4 each).
 #[test]
 fn low_passes_are_found_and_whitened() {
     for (i, (name, filter)) in filters().into_iter().enumerate() {
@@ -101,8 +104,8 @@ fn whitened(found: &Identified, rate: &[f64]) -> Vec<f64> {
     rate.iter().map(sample).collect()
 }
 
-/// `scipy.signal.cheby1(6, 1, 0.4)`, 30,000 samples: more poles than are tried at first, one by one. With those found the
-/// largest of 50 autocorrelations of the next 30,000 innovations is below 4.6/√n (2e-4).
+/// `scipy.signal.cheby1(6, 1, 0.4)`, 30,000 samples: more poles than are tried at first, one by one. With those
+/// found the largest of 50 autocorrelations of the next 30,000 innovations is below 4.6/√n (2e-4).
 #[test]
 fn steep_filters_grow() {
     let b = [1.0, 6.0, 15.0, 20.0, 15.0, 6.0, 1.0];
@@ -128,7 +131,8 @@ fn steep_filters_grow() {
     assert!(largest < 4.6 / (second.len() as f64).sqrt(), "{largest}");
 }
 
-/// A filter asked for by name takes no drift of 500 samples (its density would be σ √(2 Tc), 160 times that of the white noise) and no line of 150 samples: that is refused.
+/// A filter asked for by name takes no drift of 500 samples (its density would be σ √(2 Tc), 160 times that of the
+/// white noise) and no line of 150 samples: that is refused.
 #[test]
 fn drift_and_lines_are_no_filter() {
     let bl = |order: &str| parse_model(order).unwrap();
@@ -148,9 +152,10 @@ fn drift_and_lines_are_no_filter() {
     assert!(refused.stderr.contains("would be a line (osc) or drift (gm, flicker, rrw)"), "{}", refused.stderr);
 }
 
-/// Filters that were refused or spoiled before: a Butterworth low-pass without a converter behind it, of which nothing is left at half the sample rate, a second-order one with a resonance of
-/// quality 10, and one that takes low frequencies off. 60,000 samples: N and the drift's driving noise within 4 of their standard deviations (6e-5 each), no line for what is none, and the
-/// next 60,000 are white to the filter (4.6/√n, 2e-4 each).
+/// Filters that were refused or spoiled before: a Butterworth low-pass without a converter behind it, of which
+/// nothing is left at half the sample rate, a second-order one with a resonance of quality 10, and one that takes
+/// low frequencies off. 60,000 samples: N and the drift's driving noise within 4 of their standard deviations (6e-5
+/// each), no line for what is none, and the next 60,000 are white to the filter (4.6/√n, 2e-4 each).
 #[test]
 fn filters_without_a_floor_with_a_resonance_and_the_wrong_way_up() {
     let of = |b: &[f64], a: &[f64]| Filter::new(b, a).unwrap();
@@ -182,8 +187,9 @@ fn filters_without_a_floor_with_a_resonance_and_the_wrong_way_up() {
     }
 }
 
-/// An average over 14 samples has zeros that a bin of 2.5 % is too wide for: white noise of a hundredth of its density beside it is found within 4 standard deviations (6e-5);
-/// with bins that wide it comes out a quarter too large, with an interval of 4 %.
+/// An average over 14 samples has zeros that a bin of 2.5 % is too wide for: white noise of a hundredth of its
+/// density beside it is found within 4 standard deviations (6e-5); with bins that wide it comes out a quarter too
+/// large, with an interval of 4 %.
 #[test]
 fn bins_are_fine_where_an_average_has_its_zeros() {
     let terms = [white(0.001), Term::MovingAverage { density: 0.1, samples: 14 }, gauss_markov(0.05, 20.0)];
@@ -194,8 +200,9 @@ fn bins_are_fine_where_an_average_has_its_zeros() {
     assert!(off.abs() < 4.0 && own.std_dev_percent < 5.0, "{density}, {off}");
 }
 
-/// Averages of more samples than are all tried, with white noise of a tenth of their density and a random walk: the length is found, 16 as well, and no line stands in the zeros. Of the next 30,000 samples
-/// behind the average of 20 the largest of 50 autocorrelations is below 4.6/√n (2e-4; as lines and a filter, before, 0.03 and more).
+/// Averages of more samples than are all tried, with white noise of a tenth of their density and a random walk: the
+/// length is found, 16 as well, and no line stands in the zeros. Of the next 30,000 samples behind the average of 20
+/// the largest of 50 autocorrelations is below 4.6/√n (2e-4; as lines and a filter, before, 0.03 and more).
 #[test]
 fn long_averages_are_found_and_whitened() {
     for (run, samples) in [(0, 16), (1, 20), (2, 33), (3, 64), (4, 18), (5, 27), (6, 40), (7, 50)] {
@@ -214,8 +221,8 @@ fn long_averages_are_found_and_whitened() {
     }
 }
 
-/// Two narrow lines and a wide one, twelve logs of half a minute, are no filter with a resonance: what takes a filter first, for it explains more than one line does,
-/// stays there in four.
+/// Two narrow lines and a wide one, twelve logs of half a minute, are no filter with a resonance: what takes a
+/// filter first, for it explains more than one line does, stays there in four.
 #[test]
 fn lines_are_no_filter() {
     let line = |std_dev, frequency_hz, correlation_time| Term::Oscillation { std_dev, frequency_hz, correlation_time };
@@ -227,8 +234,9 @@ fn lines_are_no_filter() {
     assert_eq!(limited.count(), 0);
 }
 
-/// 40 logs of white noise: no filter is seen in any (a gain of 24 is the cost of the first order; in 300 other such logs noise reached 14.6 at most, and 13.2 in one of a hundred. The tail falls
-/// like that of χ², so one log in more than 10⁴, and three of 40 below 1e-7).
+/// 40 logs of white noise: no filter is seen in any (a gain of 24 is the cost of the first order; in 300 other such
+/// logs noise reached 14.6 at most, and 13.2 in one of a hundred. The tail falls like that of χ², so one log in more
+/// than 10⁴, and three of 40 below 1e-7).
 #[test]
 fn white_noise_has_no_filter() {
     let limited = (0..40).filter(|run| {
@@ -257,8 +265,8 @@ fn by_name() {
     }
 }
 
-/// What the samples add up to, as datasheets call it, is told once, of all wideband noise together: 60 √(0.02² + 0.05²) = 3.231 deg/√h. The density at low frequencies is
-/// known to 1 % from 20,000 samples; 4 standard deviations.
+/// What the samples add up to, as datasheets call it, is told once, of all wideband noise together: 60 √(0.02² +
+/// 0.05²) = 3.231 deg/√h. The density at low frequencies is known to 1 % from 20,000 samples; 4 standard deviations.
 #[test]
 fn the_random_walk_is_that_of_all_wideband_noise() {
     let bench = Bench::new();

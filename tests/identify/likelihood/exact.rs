@@ -28,9 +28,10 @@ fn plain(z: &[f64], at: Vector3<f64>, dt: f64) -> f64 {
     -0.5 * (constant + logs + squares - cross * cross / information + information.ln())
 }
 
-/// Newton's step from the estimates on the plain likelihood is 1e-4 standard deviations at most: the search ends at 3e-5 and its derivatives are right to
-/// 2e-5, those here, with steps of a three-hundredth of a standard deviation, to 2e-6. ln L is that of the plain one but for rounding. A log of 50
-/// correlation times, one of 15, where both likelihoods differ most, and one of drift that fills the samples.
+/// Newton's step from the estimates on the plain likelihood is 1e-4 standard deviations at most: the search ends at
+/// 3e-5 and its derivatives are right to 2e-5, those here, with steps of a three-hundredth of a standard deviation,
+/// to 2e-6. ln L is that of the plain one but for rounding. A log of 50 correlation times, one of 15, where both
+/// likelihoods differ most, and one of drift that fills the samples.
 #[test]
 fn estimates_are_the_maximum_of_the_plain_likelihood() {
     let cases: [(usize, f64, f64, f64); 3] =

@@ -11,9 +11,10 @@ fn together(logs: &[Vec<Stretch<'_>>], stretches: &[&[f64]], model: &str) -> Ide
     identify_logs("x", stretches, logs, 1.0, &Unit::parse("rad/s").unwrap(), &choice, &[]).unwrap()
 }
 
-/// Ten hours at 1 Hz, of which three gaps take a tenth, and one sample is not a number. What the stretches say together is known as
-/// well as from a log of their length without gaps (within 15 %: of 180 correlation times few are cut), much better than from the longest alone; each
-/// parameter is within 4 standard deviations of the truth (2e-4 for the three).
+/// Ten hours at 1 Hz, of which three gaps take a tenth, and one sample is not a number. What the stretches say
+/// together is known as well as from a log of their length without gaps (within 15 %: of 180 correlation times few
+/// are cut), much better than from the longest alone; each parameter is within 4 standard deviations of the truth
+/// (2e-4 for the three).
 #[test]
 fn gaps_cost_no_more_than_what_is_missing() {
     let samples = 36_000;
@@ -47,8 +48,9 @@ fn gaps_cost_no_more_than_what_is_missing() {
     assert!(found.exact_log_likelihood.unwrap() > 3.0 * alone.exact_log_likelihood.unwrap());
 }
 
-/// So many samples of so many states that the search does without the exact likelihood: the spread of three starts is told all the same, from one look at it. Sample standard deviation to 5 %
-/// (each bias is known to 0.02, the spread is 1).
+/// So many samples of so many states that the search does without the exact likelihood: the spread of three starts
+/// is told all the same, from one look at it. Sample standard deviation to 5 % (each bias is known to 0.02, the
+/// spread is 1).
 #[test]
 fn the_turn_on_bias_of_long_logs_is_told_too() {
     let filter =
@@ -66,8 +68,9 @@ fn the_turn_on_bias_of_long_logs_is_told_too() {
     assert!(found.params.bias.unwrap().si().abs() < 0.05);
 }
 
-/// Twelve starts of an hour with biases of known spread: what each log says of its bias is exact beside that spread, so the estimate is their sample standard
-/// deviation (the restricted likelihood divides by m − 1) to 2 %, and its 95 % interval that of χ²₁₁, 0.71 … 1.70 of it, to 10 % (profile for exact).
+/// Twelve starts of an hour with biases of known spread: what each log says of its bias is exact beside that spread,
+/// so the estimate is their sample standard deviation (the restricted likelihood divides by m − 1) to 2 %, and its
+/// 95 % interval that of χ²₁₁, 0.71 … 1.70 of it, to 10 % (profile for exact).
 #[test]
 fn repeated_starts_give_the_turn_on_bias() {
     let starts: Vec<f64> = (0..12).map(|i| 0.3 * f64::from(i * 5 % 12) - 1.0).collect();
@@ -92,8 +95,9 @@ fn repeated_starts_give_the_turn_on_bias() {
     assert!(none.is_none_or(|spread| spread.interval_si().unwrap()[0] == 0.0));
 }
 
-/// Five starts of half an hour: the terms are chosen on all of them. What one log alone does not tell (each has nine correlation times) is told by all five, in any order of the
-/// logs, a short one among them or not: the search may end elsewhere by a thousandth of a standard deviation.
+/// Five starts of half an hour: the terms are chosen on all of them. What one log alone does not tell (each has nine
+/// correlation times) is told by all five, in any order of the logs, a short one among them or not: the search may
+/// end elsewhere by a thousandth of a standard deviation.
 #[test]
 fn terms_are_chosen_on_all_logs() {
     let of = |run: u64| log(&[white(N), gauss_markov(SIGMA, TC)], 1800, 1.0, 14, run);
@@ -125,8 +129,9 @@ fn terms_are_chosen_on_all_logs() {
     }
 }
 
-/// A line of one start and another line of the other: both are looked for in both, on the same coefficients. Lines of 300 s of correlation time are 0.001 Hz wide, fewer coefficients
-/// than are taken together where no line is; a frequency is known to a tenth of that. White noise: 5 of its standard deviations (1e-6).
+/// A line of one start and another line of the other: both are looked for in both, on the same coefficients. Lines
+/// of 300 s of correlation time are 0.001 Hz wide, fewer coefficients than are taken together where no line is; a
+/// frequency is known to a tenth of that. White noise: 5 of its standard deviations (1e-6).
 #[test]
 fn lines_of_every_log_are_found() {
     let of = |run: u64, frequency_hz: f64| {
@@ -151,9 +156,10 @@ fn lines_of_every_log_are_found() {
     assert!(white.abs() < 5.0 / (2.0 * 80_000.0_f64).sqrt(), "{white}");
 }
 
-/// Two hours at 10 Hz of which two samples in a hundred are not a number, twelve rows of a hundred are not there, one gap of ten minutes begins the last quarter: the terms are
-/// those of the whole log, and each parameter is within 4.5 standard deviations of what 12 % of the samples more can move it by (√(2 · 0.12) of its own; 2e-5 for the three).
-/// Cut at its holes, the longest part would be of a minute.
+/// Two hours at 10 Hz of which two samples in a hundred are not a number, twelve rows of a hundred are not there,
+/// one gap of ten minutes begins the last quarter: the terms are those of the whole log, and each parameter is
+/// within 4.5 standard deviations of what 12 % of the samples more can move it by (√(2 · 0.12) of its own; 2e-5 for
+/// the three). Cut at its holes, the longest part would be of a minute.
 #[test]
 fn holes_take_no_terms_away() {
     let bench = Bench::new();
@@ -218,8 +224,8 @@ fn several_logs_on_the_command_line() {
     }
 }
 
-/// Twenty samples 40 sigma off double the power of 20,000 (1 + 20 · 40²/20,000 = 2.6, N 1.6 times); left out, N is the true one within 4 standard deviations of
-/// 1/√(2n). A step of the level is named.
+/// Twenty samples 40 sigma off double the power of 20,000 (1 + 20 · 40²/20,000 = 2.6, N 1.6 times); left out, N is
+/// the true one within 4 standard deviations of 1/√(2n). A step of the level is named.
 #[test]
 fn outliers_and_steps_are_told() {
     let bench = Bench::new();

@@ -15,8 +15,8 @@ const DT: f64 = 0.01;
 const DENSITY: f64 = 0.01;
 const NAMES: [&str; 6] = ["white N", "line sigma", "line f0", "line Tc", "Gauss-Markov sigma", "Gauss-Markov Tc"];
 
-/// White noise, a line and drift in the ranges that lines of measured logs at rest have: 3 to 48 Hz, correlation times of 0.2 to 20 s, two to forty times the
-/// white noise at its peak.
+/// White noise, a line and drift in the ranges that lines of measured logs at rest have: 3 to 48 Hz, correlation
+/// times of 0.2 to 20 s, two to forty times the white noise at its peak.
 fn truth(run: u64) -> [f64; 6] {
     let mut rng = stream(77, StreamId { run, axis: 9, term: 0 });
     let mut between = |low: f64, high: f64| low * (high / low).powf(normal_cdf(normal(&mut rng)));
@@ -32,7 +32,8 @@ fn found(run: u64, choice: &ModelChoice) -> Option<Identified> {
     attempt(&log(&[white(density), line, gauss_markov(sigma, slow)], SAMPLES, DT, 78, run), DT, choice).ok()
 }
 
-/// Of each parameter whether its interval holds the truth; `None` where the model has no such parameter, or another beside it, or gives no interval.
+/// Of each parameter whether its interval holds the truth; `None` where the model has no such parameter, or another
+/// beside it, or gives no interval.
 fn held(found: &Identified, truth: [f64; 6]) -> [Option<bool>; 6] {
     use kfdesign::params::TermEntry as Entry;
     let holds = |value: &kfdesign::params::Measured, truth: f64| {
@@ -88,8 +89,8 @@ fn likelihood_study_of_lines() {
     }
 }
 
-/// Of 16 logs no parameter's 95 % interval misses the truth in 6 or more: false alarm 2e-4 for each of six parameters at 95 %, 1e-3 together and less for what is seen here, since
-/// the logs are fixed.
+/// Of 16 logs no parameter's 95 % interval misses the truth in 6 or more: false alarm 2e-4 for each of six
+/// parameters at 95 %, 1e-3 together and less for what is seen here, since the logs are fixed.
 #[test]
 fn intervals_of_lines_hold_the_truth() {
     for (name, [inside, outside]) in NAMES.iter().zip(counts(16, &parse_model("white+osc+gm").unwrap())) {
@@ -99,8 +100,9 @@ fn intervals_of_lines_hold_the_truth() {
     }
 }
 
-/// A model that is given reaches the likelihood that the same model has where it is grown, also where drift passes for a line of low frequency, or a
-/// line for a Gauss-Markov process (a third of these logs, when lines were placed before drift was).
+/// A model that is given reaches the likelihood that the same model has where it is grown, also where drift passes
+/// for a line of low frequency, or a line for a Gauss-Markov process (a third of these logs, when lines were placed
+/// before drift was).
 #[test]
 fn a_given_model_is_as_likely_as_when_it_is_grown() {
     let model = "white+osc+gm";
@@ -119,8 +121,9 @@ fn a_given_model_is_as_likely_as_when_it_is_grown() {
     assert!(behind.iter().all(|(_, by)| *by < 0.01), "{behind:?}");
 }
 
-/// A line that is wider than lines beside a filter are searched (a correlation time of 0.06 s, 0.1 s is the shortest) ends there: the value stays for the model, no interval is given, and the
-/// reason stands under what is not identified.
+/// A line that is wider than lines beside a filter are searched (a correlation time of 0.06 s, 0.1 s is the
+/// shortest) ends there: the value stays for the model, no interval is given, and the reason stands under what is
+/// not identified.
 #[test]
 fn a_line_at_the_end_of_what_is_searched_is_not_identified() {
     let line = Term::Oscillation { std_dev: 0.18, frequency_hz: 20.0, correlation_time: 0.06 };

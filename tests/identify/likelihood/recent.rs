@@ -17,8 +17,9 @@ fn two_levels(levels: [f64; 2], samples: [usize; 2], run: u64) -> Vec<f64> {
     [part(0), part(1)].concat()
 }
 
-/// Thirty logs of each kind. The gain of a part is at most about ½ χ²_p (1 + ½), p ≤ 4, and must be above 10 + p: a chance below 9e-4 by that bound, and in truth
-/// far less, since a part would have to be as good as the last third's own parameters. Of 1500 logs of each kind none was told of; the nearest lacked 3.3.
+/// Thirty logs of each kind. The gain of a part is at most about ½ χ²_p (1 + ½), p ≤ 4, and must be above 10 + p: a
+/// chance below 9e-4 by that bound, and in truth far less, since a part would have to be as good as the last third's
+/// own parameters. Of 1500 logs of each kind none was told of; the nearest lacked 3.3.
 #[test]
 fn nothing_is_told_of_noise_that_stays_the_same() {
     let line = Term::Oscillation { std_dev: 0.05, frequency_hz: 0.2, correlation_time: 100.0 };
@@ -36,8 +37,9 @@ fn nothing_is_told_of_noise_that_stays_the_same() {
     }
 }
 
-/// White noise alone: −2 ln L = (n − 1) ln v + Σ (x − mean)²/v, so that the gain is known in closed form. The noise changes at 0.5 of the log, which
-/// is 0.75 of its first two thirds: only parts of at most 2/8 are of the later noise alone.
+/// White noise alone: −2 ln L = (n − 1) ln v + Σ (x − mean)²/v, so that the gain is known in closed form. The noise
+/// changes at 0.5 of the log, which is 0.75 of its first two thirds: only parts of at most 2/8 are of the later
+/// noise alone.
 #[test]
 fn gain_is_that_of_the_closed_form() {
     let rate = two_levels([0.06, 0.05], [6000, 6000], 0);
@@ -54,15 +56,16 @@ fn gain_is_that_of_the_closed_form() {
     assert!((found.gain / expected - 1.0).abs() < 1e-6, "{} {expected}", found.gain);
 }
 
-/// A change that is too small to matter, or too late to be told, changes nothing: 2 % of the density in 6000 samples gain less than one in ln L, and what
-/// happens in the last third alone was told by no part before.
+/// A change that is too small to matter, or too late to be told, changes nothing: 2 % of the density in 6000 samples
+/// gain less than one in ln L, and what happens in the last third alone was told by no part before.
 #[test]
 fn small_or_late_changes_are_left_alone() {
     assert_eq!(told(&two_levels([0.051, 0.05], [6000, 6000], 1), 1.0, "white"), None);
     assert_eq!(told(&two_levels([0.06, 0.05], [9000, 3000], 2), 1.0, "white"), None);
 }
 
-/// The command says that the noise changes, and what it says to do helps: a line that moves from 12 to 10 Hz is found where it is in the end.
+/// The command says that the noise changes, and what it says to do helps: a line that moves from 12 to 10 Hz is
+/// found where it is in the end.
 #[test]
 fn the_command_says_where_the_end_of_a_changing_log_begins() {
     let line = |frequency_hz: f64| Term::Oscillation { std_dev: 0.1, frequency_hz, correlation_time: 5.0 };

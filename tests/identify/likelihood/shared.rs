@@ -18,9 +18,9 @@ fn of(found: &[Identified]) -> kfdesign::identify::SharedTime {
     shared_time(&profiles).unwrap()
 }
 
-/// Three axes of one time, 40 s, white noise of 1 to 3: the ratio is χ²₂ (beyond 23 with 1e-5), the common time within 4.5 standard deviations of the truth
-/// (7e-6), those being at most 1/√3 of one axis' own bound for the axis with the least noise, and the interval as wide as they say (25 %, the
-/// scatter of the curvature).
+/// Three axes of one time, 40 s, white noise of 1 to 3: the ratio is χ²₂ (beyond 23 with 1e-5), the common time
+/// within 4.5 standard deviations of the truth (7e-6), those being at most 1/√3 of one axis' own bound for the axis
+/// with the least noise, and the interval as wide as they say (25 %, the scatter of the curvature).
 #[test]
 fn one_time_is_found_and_known_better() {
     let found = profiles([40.0; 3], 3);

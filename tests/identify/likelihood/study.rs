@@ -28,7 +28,8 @@ fn mean_and_sd(values: &[f64]) -> (f64, f64) {
     (mean, (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt())
 }
 
-/// Errors of ln N, ln σ, ln Tc, ln q_c against the Cramér-Rao bound. Also the ratio of the printed bound to the formula, both at the estimate.
+/// Errors of ln N, ln σ, ln Tc, ln q_c against the Cramér-Rao bound. Also the ratio of the printed bound to the
+/// formula, both at the estimate.
 ///
 /// A log in which Tc is not identified has lost its Gauss-Markov process; it is counted and left out.
 #[test]

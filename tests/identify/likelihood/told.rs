@@ -22,8 +22,9 @@ fn with_one_missing(rate: &[f64]) -> Identified {
     identify_logs("x", &[&filled], &[pieces], 1.0, &Unit::parse("rad/s").unwrap(), &ModelChoice::Auto, &[]).unwrap()
 }
 
-/// An hour of the reference sensor, 18 correlation times. A random walk is a Gauss-Markov process whose correlation time has no end: white+gm is identified
-/// where it is χ²₁(0.90) above white+rrw in 2 ln L; from there to χ²₁(0.95) Tc and σ have lower limits alone, which are in the document and in words.
+/// An hour of the reference sensor, 18 correlation times. A random walk is a Gauss-Markov process whose correlation
+/// time has no end: white+gm is identified where it is χ²₁(0.90) above white+rrw in 2 ln L; from there to χ²₁(0.95)
+/// Tc and σ have lower limits alone, which are in the document and in words.
 #[test]
 fn a_correlation_time_is_told_where_a_random_walk_is_refused() {
     let [mut told, mut open, mut closed, mut untold] = [0; 4];

@@ -21,8 +21,10 @@ fn oscillation(found: &Identified) -> [f64; 2] {
         .expect("a line")
 }
 
-/// 0.5 sin(2π 12.3456 Hz t) has the standard deviation 0.354 and no end, and no line of finite correlation time is that: what is found is the nearest one, within a factor of 1.5.
-/// Of the correlation time a lower limit is told, so of the standard deviation, which grows with it, too; and what is said of drift is what the same noise without the tone says, within a factor of 2.
+/// 0.5 sin(2π 12.3456 Hz t) has the standard deviation 0.354 and no end, and no line of finite correlation time is
+/// that: what is found is the nearest one, within a factor of 1.5. Of the correlation time a lower limit is told, so
+/// of the standard deviation, which grows with it, too; and what is said of drift is what the same noise without the
+/// tone says, within a factor of 2.
 #[test]
 fn a_steady_tone_is_a_line_without_an_end() {
     let dt = 0.01;
@@ -53,7 +55,8 @@ fn a_steady_tone_is_a_line_without_an_end() {
     assert!((found.model.white_density() / alone.model.white_density() - 1.0).abs() < 0.01);
 }
 
-/// A sinusoid alone is told; white noise of its power has its standard deviation, √dt times (whole periods: to 1e-6, the search ends within 1e-4).
+/// A sinusoid alone is told; white noise of its power has its standard deviation, √dt times (whole periods: to 1e-6,
+/// the search ends within 1e-4).
 #[test]
 fn a_sinusoid_alone_is_told() {
     let dt = 0.01;
@@ -78,8 +81,10 @@ fn a_sinusoid_alone_is_told() {
     assert_eq!(told(&identify(&walk, dt, &parse_model("white+rrw").unwrap())), None);
 }
 
-/// Eight minutes of drift of 100 s, model given: often the drift is not identified, but it moves the mean of the log, and the interval of the bias counts it. Of 40 intervals that would hold the
-/// truth in nine tenths (the drift is estimated from five correlation times) fewer than 26 do with a probability of 1e-6; with white noise alone it is one.
+/// Eight minutes of drift of 100 s, model given: often the drift is not identified, but it moves the mean of the
+/// log, and the interval of the bias counts it. Of 40 intervals that would hold the truth in nine tenths (the drift
+/// is estimated from five correlation times) fewer than 26 do with a probability of 1e-6; with white noise alone it
+/// is one.
 #[test]
 fn the_bias_counts_drift_that_is_not_told() {
     let choice = parse_model("white+gm").unwrap();
@@ -94,7 +99,8 @@ fn the_bias_counts_drift_that_is_not_told() {
     assert!(count(|own| own.1) >= 5, "none of these logs lacks the drift: {found:?}");
 }
 
-/// Slopes of two of their standard deviations, √12 N T^(−3/2) each: what is chosen has no ramp whose interval holds zero.
+/// Slopes of two of their standard deviations, √12 N T^(−3/2) each: what is chosen has no ramp whose interval holds
+/// zero.
 #[test]
 fn a_slope_whose_interval_holds_zero_is_not_identified() {
     let slope = 2.0 * 12.0_f64.sqrt() * 0.05 * 300.0_f64.powf(-1.5);

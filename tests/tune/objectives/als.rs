@@ -63,7 +63,8 @@ impl Example {
         all
     }
 
-    /// Means of the estimates of many runs are the truth within five of their standard deviations: false alarm 6e-7 each.
+    /// Means of the estimates of many runs are the truth within five of their standard deviations: false alarm 6e-7
+    /// each.
     fn assert_recovers(&self, sizes: &[f64], runs: u64, count: usize) -> Vec<f64> {
         let of = |run| {
             let sampled = self.sampled(sizes, run, count, 100, 15);
@@ -85,8 +86,8 @@ fn diagonal(n: usize, values: &[f64]) -> DMatrix<f64> {
     DMatrix::from_diagonal(&DVector::from_fn(n, |i, _| values[i]))
 }
 
-/// "Motivating example" of the authors' ALS package (Rajamani 2007, thesis, section 2.2): Q = 0.5, R = 0.1, a filter made for 0.2 and 0.4,
-/// 1000 points, the first 100 left out, 15 lags, 200 runs.
+/// "Motivating example" of the authors' ALS package (Rajamani 2007, thesis, section 2.2): Q = 0.5, R = 0.1, a filter
+/// made for 0.2 and 0.4, 1000 points, the first 100 left out, 15 lags, 200 runs.
 #[test]
 fn the_motivating_example_of_the_authors_is_recovered() {
     let mut f = diagonal(3, &[0.1, 0.2, 0.3]);
@@ -104,8 +105,8 @@ fn the_motivating_example_of_the_authors_is_recovered() {
     assert!(spread[0] < 0.15 && spread[1] < 0.04, "{spread:?}");
 }
 
-/// The diagonal example of the same package (`simulate_data8_diag`): three measurements, six variances, a filter made for a Q of 1, 2, 3 and
-/// nearly no R.
+/// The diagonal example of the same package (`simulate_data8_diag`): three measurements, six variances, a filter
+/// made for a Q of 1, 2, 3 and nearly no R.
 #[test]
 fn six_variances_of_the_diagonal_example_are_recovered() {
     let mut f = diagonal(3, &[0.1, 0.2, 0.3]);
@@ -151,8 +152,8 @@ fn simulated(params: &Params, samples: u64, seed: u64) -> SensorLog {
     SensorLog { missing: vec![0; samples as usize], sensor: axes.swap_remove(0).measured, aids: vec![] }
 }
 
-/// Four hours at 10 Hz, the start wrong by factors. False alarm: five standard deviations each, 6e-7; the spread that the least squares
-/// claims holds for a gain near the best one, and this one is not: half of it more.
+/// Four hours at 10 Hz, the start wrong by factors. False alarm: five standard deviations each, 6e-7; the spread
+/// that the least squares claims holds for a gain near the best one, and this one is not: half of it more.
 #[test]
 fn amounts_of_noise_of_a_sensor_are_found_and_times_stay() {
     let truth = sensor(10.0, vec![white(0.05), gauss_markov(0.04, 60.0)], Some(0.5));

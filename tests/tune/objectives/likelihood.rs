@@ -100,7 +100,8 @@ fn a_flight_with_a_compass_has_the_maximum_that_statsmodels_finds() {
     assert_maximum(&turning(), log_that_turns(), 800.0, -652.8944973005609, -612.8279073766166, &reference);
 }
 
-/// The bias as an unknown with a prior against the plain filter with a state for it; gaps and samples that are no numbers included.
+/// The bias as an unknown with a prior against the plain filter with a state for it; gaps and samples that are no
+/// numbers included.
 #[test]
 fn the_likelihood_is_that_of_the_plain_filter() {
     let mut log = log_at_rest();
@@ -129,7 +130,8 @@ fn the_likelihood_is_that_of_the_plain_filter() {
 #[test]
 fn a_prior_holds_what_the_log_tells_less_well() {
     let logs = log(vec![log_at_rest()]);
-    // standard deviations of the logarithms by log 0.37 and by interval 0.005 for the time, 0.013 and 0.5 for the density
+    // standard deviations of the logarithms by log 0.37 and by interval 0.005 for the time, 0.013 and 0.5 for the
+    // density
     let known = [
         ("white.density", [0.04, 0.04 * (4.0 * 0.5_f64 * 0.98).exp()]),
         ("gauss_markov.correlation_time", [9.9, 10.1]),

@@ -20,8 +20,8 @@ fn nees_and_nis_become_one_also_where_the_truth_has_other_processes() {
         close(found.nees[0], 1.0, 1e-8);
         close(found.nis, 1.0, 1e-8);
         assert!(found.met);
-        // the recursion from the first measurement on: after ten settling times as settled, but for the constant bias, of which a tenth of
-        // the first settling time's variance is left
+        // the recursion from the first measurement on: after ten settling times as settled, but for the constant
+        // bias, of which a tenth of the first settling time's variance is left
         let over_time = &under_truth(&tuned, &truth, &TuneOptions::default()).unwrap()[0];
         let (real, claimed) = (over_time.drift.real.last().unwrap(), over_time.drift.claimed.last().unwrap());
         close(real / claimed, 1.0, 2e-2);

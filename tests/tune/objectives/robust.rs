@@ -32,8 +32,8 @@ fn too_small(design: &Tuned, truth: &LinearModel) -> bool {
     error.covariance[(0, 0)] > error.claimed[(0, 0)]
 }
 
-/// 80 sensors: as identified, the claim is too small for half of them; robust, for 5 % at most. False alarm: P(Bin(80, 0.05) > 17) = 8e-8,
-/// P(Bin(80, 0.5) ≤ 17) = 1e-7.
+/// 80 sensors: as identified, the claim is too small for half of them; robust, for 5 % at most. False alarm:
+/// P(Bin(80, 0.05) > 17) = 8e-8, P(Bin(80, 0.5) ≤ 17) = 1e-7.
 #[test]
 fn the_claim_holds_for_sensors_drawn_from_the_intervals() {
     let params = uncertain();
@@ -83,7 +83,8 @@ fn the_price_is_small_and_the_record_is_that_of_the_design() {
     assert!(fewer.robust[0].met);
 }
 
-/// Estimates of sigma and time err together; what the filter uses, sigma²/time, is known better than each: less inflation is needed.
+/// Estimates of sigma and time err together; what the filter uses, sigma²/time, is known better than each: less
+/// inflation is needed.
 #[test]
 fn correlated_errors_of_a_likelihood_ask_for_less() {
     let params = uncertain();

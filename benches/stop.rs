@@ -1,5 +1,5 @@
 //! How long after a stop is asked for the work has ended: two hours of a gyro at 100 Hz, stopped at thirty moments of
-//! each command's work. Prints a table; docs/performance.md has it.
+//! each command's work. Prints a table.
 
 #![allow(clippy::print_stdout)] // a table is all it makes
 

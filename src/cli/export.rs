@@ -8,7 +8,7 @@ use anyhow::{Context, anyhow, bail};
 
 use super::Status;
 use super::files::{self, Kind};
-use super::output::{print_report, print_text, say};
+use super::output::{print_report, print_text, say, with_flags};
 use crate::export::atomic;
 use crate::export::consumer::{Choice, Export, Target, Walk, write};
 use crate::ops::amounts::with_unit;
@@ -143,12 +143,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     for warning in &written.warnings {
         say(&format!("  warning: {warning}"));
     }
+    let text = with_flags(&written.text);
     match &args.output {
         Some(path) => {
-            atomic::write(path, written.text.as_bytes())?;
+            atomic::write(path, text.as_bytes())?;
             print_report(&view::export::export(&[path.display().to_string()], None));
         }
-        None => print_text(&written.text),
+        None => print_text(&text),
     }
     Ok(Status::Done)
 }

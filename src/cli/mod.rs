@@ -1,4 +1,4 @@
-//! One file per command; the only place that prints and exits (floor 7).
+//! One file per command; the only place that prints and exits (floor 9).
 //!
 //! Exit status: 0 done and consistent; 1 done, but a stated check failed or could not be judged; 2 could not do it,
 //! with one clear line. It is that of the work, once known, whatever happens to stdout or stderr.

@@ -53,7 +53,7 @@ pub fn watched<T: Send>(watch: &Arc<dyn Progress>, work: impl FnOnce() -> T + Se
             done
         }
     }));
-    done.map_err(|why| if why.is::<Stopped>() { Stopped } else { resume_unwind(why) })
+    done.map_err(|why| if is_stop(&*why) { Stopped } else { resume_unwind(why) })
 }
 
 /// Who waited before, who waits again when this is dropped.

@@ -1,4 +1,4 @@
-//! One file per command: what it is asked for, a `Request`, becomes a result with its document (floor 7).
+//! One file per command: what it is asked for, a `Request`, becomes a result with its document (floor 8).
 //!
 //! A request is described once: its fields are flags of the command line, and keys of a JSON object (unknown ones are
 //! refused). Nothing here prints: notes and progress go to who waits ([`crate::numerics::progress`]), files other than
@@ -11,6 +11,7 @@ pub mod checked;
 pub mod compare;
 pub mod identify;
 pub mod inflate;
+mod logs;
 pub mod plan;
 pub mod reading;
 pub mod replay;

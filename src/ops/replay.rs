@@ -8,14 +8,14 @@ use anyhow::{Context, bail};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::aid_columns::aid_columns;
 use super::amounts::with_unit;
 use super::checked;
-use super::reading::{Reading, note_check};
+use super::logs::{Logs, Opened};
+use super::reading::Reading;
 use crate::consistency::{Test, TestKind};
 use crate::export::table::TableWriter;
 use crate::filter::{AttitudeDesign, FilterDesign, Form};
-use crate::input::{Block, LogOptions, LogReader};
+use crate::input::{Block, LogReader};
 use crate::numerics::progress::{advance, begin, note};
 use crate::replay::attitude::AttitudeReplay;
 use crate::replay::{Estimates, LogShape, Options, ReplayResult, Replayer};
@@ -137,22 +137,8 @@ pub fn run(request: &Request) -> anyhow::Result<Done> {
     }
     request.attitude.refuse()?;
     let design = checked::design(&request.filter)?;
-    let extra = aid_columns(&request.aid, &design).with_context(|| request.filter.display().to_string())?;
-    let extra_columns = extra.len();
-    let mut reader = LogReader::open(&request.log, &LogOptions { extra, ..request.reading.rates()? })?;
-    let name = request.log.display().to_string();
-    let mut check = reader.check().clone();
-    // a plant's log is one that moves
-    if design.plant != "static" {
-        check.expect_motion();
-    }
-    note_check(&name, &check);
-    let shape = LogShape {
-        axes: reader.axes().iter().map(|a| a.name.clone()).collect(),
-        quantity: reader.quantity(),
-        sample_rate_hz: reader.check().sample_rate_hz,
-        aids: extra_columns,
-    };
+    let logs = Logs { reading: &request.reading, aids: &request.aid };
+    let Opened { name, mut reader, shape, check } = logs.open(&request.log, &design)?;
     let replayer = Replayer::new(&design, &shape, request.options()?).with_context(|| name.clone())?;
     note_assignment(&design, &replayer, &shape);
     let mut result = stream(request, &design, replayer, &mut reader)?;

@@ -2,7 +2,6 @@
 
 pub mod attitude;
 pub mod compare;
-mod logs;
 pub mod objective;
 pub mod plant_flags;
 
@@ -13,11 +12,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use self::logs::Logs;
 use self::objective::{ObjectiveArg, ObjectiveFlags};
 use self::plant_flags::PlantFlags;
 use super::amounts::whole;
 use super::checked;
+use super::logs::Logs;
 use super::reading::Reading;
 use crate::consistency::Verdict;
 use crate::filter::FilterDesign;

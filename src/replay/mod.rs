@@ -22,7 +22,7 @@ use serde::Serialize;
 use crate::consistency::{Test, Verdict};
 use crate::filter::smoother::{History, Smoothed, smooth};
 use crate::filter::{AxisDesign, FilterDesign, Form, Running};
-use crate::input::Block;
+use crate::input::{Block, LogReader};
 use crate::model::{LinearModel, Named};
 use crate::numerics::linalg::LinalgError;
 use crate::numerics::progress::checkpoint;
@@ -86,6 +86,18 @@ pub struct LogShape {
     pub sample_rate_hz: f64,
     /// Extra columns, in the order of [`aids`].
     pub aids: usize,
+}
+
+impl LogShape {
+    /// Of an open log of which so many columns are aids.
+    pub fn of(reader: &LogReader, aids: usize) -> LogShape {
+        LogShape {
+            axes: reader.axes().iter().map(|axis| axis.name.clone()).collect(),
+            quantity: reader.quantity(),
+            sample_rate_hz: reader.check().sample_rate_hz,
+            aids,
+        }
+    }
 }
 
 /// A measurement of a design that is not of its sensor, or an input that is known exactly.

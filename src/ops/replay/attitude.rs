@@ -98,12 +98,7 @@ pub(super) fn run(request: &Request) -> anyhow::Result<Done> {
     let mut check = reader.check().clone();
     check.expect_motion();
     note_check(&name, &check);
-    let shape = LogShape {
-        axes: reader.axes().iter().map(|a| a.name.clone()).collect(),
-        quantity: reader.quantity(),
-        sample_rate_hz: reader.check().sample_rate_hz,
-        aids: 0,
-    };
+    let shape = LogShape::of(&reader, 0);
     let wanted = design.axes.each_ref().map(String::as_str);
     let assigned =
         assign_to(&wanted, Quantity::AngularRate, design.sample_rate_hz, &shape).with_context(|| name.clone())?;

@@ -6,12 +6,12 @@ use anyhow::{Context, bail};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::logs::{Logs, Opened};
 use super::plant_flags::PlantFlags;
 use crate::compare::designs::{Contest, RankError, Ranking};
 use crate::filter::FilterDesign;
 use crate::input::InputError;
 use crate::ops::checked;
+use crate::ops::logs::{Logs, Opened};
 use crate::ops::reading::Reading;
 use crate::params::{Params, place};
 use crate::tune::{TuneOptions, tune};
@@ -52,7 +52,7 @@ pub fn run(request: &Request) -> anyhow::Result<(Ranking, FilterDesign)> {
     let Some((_, first)) = designs.first().cloned() else { bail!("`compare`: no design") };
     let mut contest = Contest::new(designs, held_out)?;
     for path in logs {
-        let Opened { name, mut reader, shape } = logs_of.open(path, &first)?;
+        let Opened { name, mut reader, shape, .. } = logs_of.open(path, &first)?;
         let rows = reader.check().samples;
         contest
             .log(&name, &shape, rows, |block| reader.next_block(block).map_err(Failed::Input))

@@ -17,6 +17,7 @@ use super::{Found, ObjectiveError, Problem};
 use crate::model::LinearModel;
 use crate::numerics::distribution::chi_square_quantile;
 use crate::numerics::optimize::{self, bisect, half_way, look, minimize};
+use crate::numerics::progress::checkpoint;
 use crate::tune::TuneError;
 use crate::tune::parameters::Group;
 
@@ -130,6 +131,7 @@ impl Study<'_> {
     fn sensors(&self, set: u32, count: u64) -> Result<Vec<Sensor>, ObjectiveError> {
         let (seed, axis) = (self.problem.request.seed, self.group.axes[0]);
         let sensor = |k: u64| -> Result<Sensor, TuneError> {
+            checkpoint();
             let models = self.problem.models(self.group, &self.belief.draw(seed, axis, set, k))?;
             Ok(Sensor { truths: models.iter().map(Truth::new).collect(), models })
         };

@@ -6,6 +6,7 @@ use crate::filter::mismatch::expect_settled;
 use crate::filter::{Cycle, Judge};
 use crate::model::{DRIFT, LinearModel, Named};
 use crate::numerics::linalg::LinalgError;
+use crate::numerics::progress::checkpoint;
 use crate::tune::closed_loop::{driven, settled};
 
 /// A settled filter, without the constants that it learns for good.
@@ -52,6 +53,7 @@ impl Truth {
 impl Settled {
     /// `None` when no error stays: a filter without drift averages for ever.
     pub(super) fn new(model: &LinearModel) -> Result<Option<Settled>, LinalgError> {
+        checkpoint();
         let kept = driven(model, &model.drift_row());
         let Some(cycle) = Cycle::new(&model.every).filter(|_| !kept.is_empty()) else { return Ok(None) };
         let filter = settled(model, &kept)?;
@@ -71,6 +73,7 @@ impl Settled {
 
     /// Errors: they grow without bound in this truth.
     pub(super) fn under(&self, truth: &Truth) -> Result<Real, LinalgError> {
+        checkpoint();
         let judge = Judge { of_truth: truth.rows.clone(), ..self.judge.clone() };
         let found = expect_settled(&self.filter, &truth.model, &judge, &self.cycle)?;
         let sigma = found.error.covariance.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect();

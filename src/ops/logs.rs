@@ -1,4 +1,4 @@
-//! Logs for `tune`: read into memory for the objectives, replayed, or for a ranking.
+//! Logs for a design: opened, with the columns of its aids; read into memory, or replayed for the verdict alone.
 
 use std::path::Path;
 
@@ -12,6 +12,7 @@ use crate::ops::aid_columns::aid_columns;
 use crate::ops::reading::{Reading, note_check};
 use crate::replay::axes::assign;
 use crate::replay::{LogShape, Options, ReplayResult, Replayer};
+use crate::signal::LogCheck;
 use crate::tune::objective::Log;
 
 /// How logs are read, and the columns of the aids.
@@ -25,6 +26,8 @@ pub(crate) struct Opened {
     pub(crate) name: String,
     pub(crate) reader: LogReader,
     pub(crate) shape: LogShape,
+    /// What was found that a log of this plant should not have.
+    pub(crate) check: LogCheck,
 }
 
 impl Logs<'_> {
@@ -39,18 +42,12 @@ impl Logs<'_> {
             check.expect_motion();
         }
         note_check(&name, &check);
-        let shape = LogShape {
-            axes: reader.axes().iter().map(|a| a.name.clone()).collect(),
-            quantity: reader.quantity(),
-            sample_rate_hz: check.sample_rate_hz,
-            aids,
-        };
-        Ok(Opened { name, reader, shape })
+        Ok(Opened { shape: LogShape::of(&reader, aids), name, reader, check })
     }
 
     /// The whole log, its axes in the order of the design's, and its SHA-256.
     pub(crate) fn read(&self, path: &Path, design: &FilterDesign) -> anyhow::Result<(Log, String)> {
-        let Opened { name, mut reader, shape } = self.open(path, design)?;
+        let Opened { name, mut reader, shape, .. } = self.open(path, design)?;
         let assigned = assign(design, &shape).with_context(|| name.clone())?;
         let beside = |model: &LinearModel| model.measurements.len() - usize::from(model.inputs.is_empty());
         if design.axes.iter().map(|axis| beside(&axis.model)).sum::<usize>() != shape.aids {
@@ -75,7 +72,7 @@ impl Logs<'_> {
 
     /// The log through the design; only the verdict is wanted.
     pub(crate) fn replay(&self, path: &Path, design: &FilterDesign) -> anyhow::Result<ReplayResult> {
-        let Opened { name, mut reader, shape } = self.open(path, design)?;
+        let Opened { name, mut reader, shape, .. } = self.open(path, design)?;
         let mut replayer = Replayer::new(design, &shape, Options::default()).with_context(|| name.clone())?;
         let mut block = Block::default();
         begin("replay", reader.check().samples);

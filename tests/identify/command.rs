@@ -204,6 +204,8 @@ fn a_log_that_moves_is_a_failed_check_wherever_it_goes() {
         assert_eq!(said, 1, "{command}: {}", out.stderr);
     }
     assert!(!bench.read("imu.m").contains("identified at rest"), "{}", bench.read("imu.m"));
+    // what another program's user reads there is a flag
+    assert!(bench.read("imu.m").contains("that --end 99.2 leaves"), "{}", bench.read("imu.m"));
     assert!(bench.read("imu.m").contains(failed));
     // the design hands it on
     if bench.files().contains(&"filter.json".to_string()) {

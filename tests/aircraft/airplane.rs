@@ -1,5 +1,7 @@
 //! `kfdesign airplane` and `kfdesign trim` as a user has them: documents, views, and what is refused in one line.
 
+use kfdesign::aircraft::airframe::Airplane;
+use kfdesign::aircraft::airframe::trim::{Sideways, TrimRequest, Turn};
 use serde_json::{Value, json};
 
 use crate::support::{Bench, data};
@@ -117,6 +119,25 @@ fn what_is_missing_is_named_where_there_is_no_solution() {
     let file = data("airplanes/ultrastick-25e-propeller.json").display().to_string();
     let fast = ["trim", &file, "--speed", "45 m/s", "--altitude", "100 m"];
     refused(&bench(), &fast, &["no thrust", "there are 0.0 N at full throttle"]);
+}
+
+/// The elevator of this airplane holds its wing down near the stall, where Newton's method fails: what is missing is
+/// lift, at every speed below the slowest.
+#[test]
+fn what_ends_slow_flight_is_lift() {
+    let mut document = document("ultrastick-25e");
+    document["aerodynamics"]["stall"] = json!({ "sharpness": "40", "angle": "13 deg" });
+    document["aerodynamics"]["lift"]["elevator"] = json!("0.8 1/rad");
+    let airplane = Airplane::from_json(&document.to_string(), "made up").unwrap();
+    let trim = |airspeed: f64| {
+        let (turn, sideways) = (Turn::Rate(0.0), Sideways::ZeroSideslip);
+        airplane.trim(&TrimRequest { airspeed, altitude: 0.0, climb: 0.0, turn, sideways })
+    };
+    let missing: Vec<_> = (0..100).map(|i| trim(8.0 + 0.05 * f64::from(i)).map_err(|e| e.missing).err()).collect();
+    let slowest = missing.iter().position(Option::is_none).unwrap();
+    assert!((20..90).contains(&slowest), "{missing:?}");
+    assert!(missing[..slowest].iter().all(|m| *m == Some("lift")), "{missing:?}");
+    assert!(missing[slowest..].iter().all(Option::is_none), "{missing:?}");
 }
 
 #[test]

@@ -109,8 +109,15 @@ fn what_cannot_be_flown_is_refused_in_one_line() {
         (change("gusts", json!({ "model": "von Karman" })), "", &["gusts.model", "known are dryden, 1-cos"]),
         (change("earth", json!("round")), "", &["earth", "known are flat, wgs84"]),
         (change("earth", json!({ "wgs84": {} })), "", &["earth.wgs84.latitude", "missing"]),
+        (
+            change("earth", json!({ "wgs84": { "latitude": "95 deg", "longitude": "0 deg" } })),
+            "",
+            &["latitude: 95.000 deg", "-90 to 90 deg"],
+        ),
         (change("controls", json!({ "elevator": "30 deg" })), "", &["controls.elevator", "beyond the stops"]),
         (change("controls", json!({ "throttle": 1.5 })), "", &["controls.throttle", "expected 0 to 1"]),
+        (change("controls", json!({ "thrust": "5 N" })), "", &["controls.thrust", "give its throttle"]),
+        (change("controls", json!("much.csv")), "", &["controls.throttle: 1.5 is not from 0 to 1"]),
         (change("control", json!({})), "", &["unknown key", "did you mean 'controls'"]),
         (change("airplane", json!("none.json")), "", &["airplane", "none.json", "cannot read"]),
         (change("controls", json!("none.csv")), "", &["none.csv", "cannot read"]),
@@ -140,13 +147,14 @@ fn what_cannot_be_flown_is_refused_in_one_line() {
     ];
     for (document, flags, words) in rows {
         let bench = Bench::new();
+        bench.file("much.csv", "time (s),throttle\n0,0.7\n90,1.5\n");
         bench.file("short.csv", "time (s),throttle\n0,0.7\n3,0.8\n");
         bench.file("flight.json", document.to_string());
         let out = bench.run(&format!("fly flight.json -o out.csv {flags}"));
         assert_eq!(out.status, 2, "{document}\n{out:?}");
         assert_eq!(out.stderr.lines().count(), 1, "{out:?}");
         assert!(words.iter().all(|word| out.stderr.contains(word)), "{words:?}\n{out:?}");
-        assert_eq!(bench.files(), ["flight.json", "short.csv"]);
+        assert_eq!(bench.files(), ["flight.json", "much.csv", "short.csv"]);
     }
 }
 

@@ -115,3 +115,22 @@ fn the_trajectory_of_another_airplane() {
         near(&table.at(time, &[VELOCITY, ANGLES, RATES].concat()), &row[3..], 2e-8);
     }
 }
+
+/// The column has the name and the unit of the document's key.
+#[test]
+fn a_file_gives_its_thrust() {
+    let bench = crate::support::Bench::new();
+    let file = bench.file("commands.csv", "time (s),thrust (mN)\n0,4000\n1,4000\n");
+    let fly = |controls: serde_json::Value| {
+        let document = json!({
+            "format": "kfdesign-flight/1",
+            "airplane": "ultrastick-25e.json",
+            "trim": { "airspeed": "17 m/s", "altitude": "300 m" },
+            "controls": controls
+        });
+        one(&document, times(1.0, Some(1.0), None)).last(&VELOCITY)
+    };
+    let fixed = fly(json!({ "thrust": "4 N" }));
+    near(&fly(json!({ "file": file })), &fixed, 1e-12);
+    assert!(fixed[0] > 17.3, "{fixed:?}");
+}

@@ -96,3 +96,12 @@ fn it_rests_at_a_stop_and_leaves_it() {
     servo.advance(&mut state, 0.1, 1.0);
     assert!((state.angle - 0.1).abs() < 1e-12);
 }
+
+/// Where e^(ζωt) and cosh ωd t are beyond all numbers.
+#[test]
+fn a_long_step_of_a_stiff_servo_ends_at_the_command() {
+    let servo = Servo { frequency: 1e4, damping: 5.0, ..servo(f64::INFINITY) };
+    let mut state = servo.at_rest(0.0);
+    servo.advance(&mut state, 0.1, 1.0);
+    assert!((state.angle - 0.1).abs() < 1e-12 && state.rate.abs() < 1e-9, "{state:?}");
+}

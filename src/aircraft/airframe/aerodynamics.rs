@@ -4,8 +4,6 @@
 //! of a flat plate behind the stall (Beard and McLain 2012, section 4.2); drag is a parasitic part and one of the lift.
 //! Rotation into body axes by α alone, the side force in body axes.
 
-use std::f64::consts::PI;
-
 use super::{AirState, Controls, Size, Wrench};
 
 /// Derivatives of the lift.
@@ -40,8 +38,8 @@ pub struct Lateral {
 /// The part of the drag that lift makes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Drag {
-    /// (CL0 + CLα α)²/(π e b²/S).
-    Oswald(f64),
+    /// k (CL0 + CLα α)², with Oswald's factor e and the area S: k = S/(π e b²).
+    Linear { factor: f64 },
     /// k (CL − CL of least drag)² of the whole lift.
     Polar { factor: f64, least: f64 },
 }
@@ -52,6 +50,8 @@ pub enum Drag {
 pub struct Stall {
     pub sharpness: f64,
     pub angle: f64,
+    /// e^(−2Mα0), what both exponentials have in common.
+    common: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,13 +86,18 @@ fn direction(y: f64, x: f64) -> f64 {
 }
 
 impl Stall {
-    /// 0 far below the stall, 1 far above.
+    pub fn new(sharpness: f64, angle: f64) -> Stall {
+        Stall { sharpness, angle, common: (-2.0 * sharpness * angle).exp() }
+    }
+
+    /// σ: 0 far below the stall, 1 far above. With g = e^(M(|α| − α0)) = 1/e₁ and e₂ = g/e^(−2Mα0) it is even in α and
+    /// takes one exponential and one division.
     #[inline(always)]
     pub fn blend(&self, alpha: f64) -> f64 {
-        let [a, b] = [self.angle - alpha, self.angle + alpha].map(|below| (self.sharpness * below).exp());
-        // (1 + a + b)/((1 + a)(1 + b)) without products of large numbers
-        let (x, y) = (1.0 / (1.0 + a), 1.0 / (1.0 + b));
-        x + y - x * y
+        // e^600 is the largest product below; the least number there is stands against 0/0
+        let g = (self.sharpness * (alpha.abs() - self.angle)).min(300.0).exp();
+        let sum = g + self.common + f64::MIN_POSITIVE;
+        (g * sum + self.common) / ((1.0 + g) * sum)
     }
 }
 
@@ -110,13 +115,13 @@ impl Lateral {
 
 impl Aerodynamics {
     /// CL and CD at an angle of attack (rad), a pitch rate q̂ and an elevator (rad).
-    pub fn lift_and_drag(&self, size: &Size, alpha: f64, q: f64, elevator: f64) -> (f64, f64) {
-        self.along_and_across(size, alpha, alpha.sin_cos(), q, elevator)
+    pub fn lift_and_drag(&self, alpha: f64, q: f64, elevator: f64) -> (f64, f64) {
+        self.along_and_across(alpha, alpha.sin_cos(), q, elevator)
     }
 
     /// The same with sine and cosine of α beside it.
     #[inline(always)]
-    fn along_and_across(&self, size: &Size, alpha: f64, (sin, cos): (f64, f64), q: f64, elevator: f64) -> (f64, f64) {
+    fn along_and_across(&self, alpha: f64, (sin, cos): (f64, f64), q: f64, elevator: f64) -> (f64, f64) {
         let linear = self.lift.zero + self.lift.alpha * alpha;
         let steady = match &self.stall {
             None => linear,
@@ -128,7 +133,7 @@ impl Aerodynamics {
         };
         let lift = steady + self.lift.pitch_rate * q + self.lift.elevator * elevator;
         let of_lift = match self.drag {
-            Drag::Oswald(e) => linear * linear * size.area / (PI * e * size.span * size.span),
+            Drag::Linear { factor } => factor * linear * linear,
             Drag::Polar { factor, least } => factor * (lift - least) * (lift - least),
         };
         (lift, self.parasitic + of_lift + self.drag_pitch_rate * q + self.drag_elevator * elevator)
@@ -144,13 +149,13 @@ impl Aerodynamics {
         let per_speed = 1.0 / speed;
         let along = (u * u + w * w).sqrt();
         // asin(v/V) by both sides of its triangle, which rounding cannot leave
-        let (alpha, beta) = (direction(w, u), direction(v, along));
         let per_along = 1.0 / along;
+        let (alpha, beta) = (direction(w, u), direction(v, along));
         let (sin, cos) = if along > 0.0 { (w * per_along, u * per_along) } else { (0.0, 1.0) };
         let half = 0.5 * per_speed;
         let [p, q, r] = [size.span, size.chord, size.span].map(|length| length * half);
         let (p, q, r) = (p * air.rate[0], q * air.rate[1], r * air.rate[2]);
-        let (lift, drag) = self.along_and_across(size, alpha, (sin, cos), q, controls.elevator);
+        let (lift, drag) = self.along_and_across(alpha, (sin, cos), q, controls.elevator);
         let pitch = self.pitch.zero
             + self.pitch.alpha * alpha
             + self.pitch.pitch_rate * q
@@ -166,7 +171,28 @@ impl Aerodynamics {
 
 #[cfg(test)]
 mod tests {
-    use super::direction;
+    use super::{Stall, direction};
+
+    /// The published form, where it has no product of large numbers, and the ends where it has.
+    #[test]
+    fn the_blend_is_the_published_one() {
+        for (sharpness, angle) in [(50.0, 0.47), (5.0, 0.2), (0.5, 0.05)] {
+            let stall = Stall::new(sharpness, angle);
+            for i in -150..=150 {
+                let alpha = f64::from(i) * 0.01;
+                let [a, b] = [(-sharpness * (alpha - angle)).exp(), (sharpness * (alpha + angle)).exp()];
+                let expected = (1.0 + a + b) / ((1.0 + a) * (1.0 + b));
+                let found = stall.blend(alpha);
+                assert!((found - expected).abs() <= 1e-13 * expected, "{sharpness} {alpha}: {found} {expected}");
+            }
+        }
+        let sharp = Stall::new(5000.0, 0.3);
+        assert_eq!(
+            [0.0, 0.29, 0.31, -3.0, 3.0].map(|alpha| sharp.blend(alpha) > 0.5),
+            [false, false, true, true, true]
+        );
+        assert!([0.0, 0.3, 3.0].iter().all(|alpha| (0.0..=1.0).contains(&sharp.blend(*alpha))));
+    }
 
     /// To two units in the last place, on both sides of where the series ends, and where there is no direction.
     #[test]

@@ -102,7 +102,7 @@ impl Airplane {
         let stall = self.aerodynamics.stall.map(|stall| {
             // the blended lift turns a little before the angle of the document
             let angles = (0..=600).map(|i| stall.angle * 1.5 * f64::from(i) / 600.0);
-            let lift = |alpha: f64| self.aerodynamics.lift_and_drag(size, alpha, 0.0, 0.0).0;
+            let lift = |alpha: f64| self.aerodynamics.lift_and_drag(alpha, 0.0, 0.0).0;
             let (angle, greatest_lift) =
                 angles.map(|a| (a, lift(a))).fold((0.0, 0.0), |best, now| if now.1 > best.1 { now } else { best });
             StallCheck { angle, greatest_lift, airspeed: unit_speed / greatest_lift.sqrt() }

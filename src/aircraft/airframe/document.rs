@@ -1,5 +1,6 @@
 //! airplane.json: an airplane with every number in its unit.
 
+use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
 use super::{
@@ -56,19 +57,18 @@ fn airplane(place: &Place<'_>) -> Result<Airplane, KeyError> {
     }
     let actuators = o.optional("actuators").map(|p| p.object(&["elevator", "aileron", "rudder"])).transpose()?;
     let actuator = |key: &str| actuators.as_ref().and_then(|o| o.optional(key)).map(|p| actuator(&p)).transpose();
+    let reference = o.required("reference")?.object(&["area", "span", "chord"])?;
+    let size = Size {
+        area: positive(&reference, "area", AREA)?,
+        span: positive(&reference, "span", LENGTH)?,
+        chord: positive(&reference, "chord", LENGTH)?,
+    };
     Ok(Airplane {
         name: o.required("name")?.text()?.to_string(),
         mass: positive(&o, "mass", Dimension::MASS)?,
         inertia: inertia(&o.required("inertia")?)?,
-        size: {
-            let o = o.required("reference")?.object(&["area", "span", "chord"])?;
-            Size {
-                area: positive(&o, "area", AREA)?,
-                span: positive(&o, "span", LENGTH)?,
-                chord: positive(&o, "chord", LENGTH)?,
-            }
-        },
-        aerodynamics: aerodynamics(&o.required("aerodynamics")?)?,
+        size,
+        aerodynamics: aerodynamics(&o.required("aerodynamics")?, &size)?,
         propulsion: propulsion(&o.required("propulsion")?)?,
         actuators: [actuator("elevator")?, actuator("aileron")?, actuator("rudder")?],
         positions: o.optional("positions").map(|p| positions(&p)).transpose()?.unwrap_or_default(),
@@ -152,7 +152,7 @@ fn lateral(o: &Object<'_>, key: &str, what: &str) -> Result<Lateral, KeyError> {
     })
 }
 
-fn aerodynamics(place: &Place<'_>) -> Result<Aerodynamics, KeyError> {
+fn aerodynamics(place: &Place<'_>, size: &Size) -> Result<Aerodynamics, KeyError> {
     let o = place.object(&["lift", "drag", "side", "roll", "pitch", "yaw", "stall"])?;
     let four = |key: &str, what: &str| -> Result<[f64; 4], KeyError> {
         let o = o.required(key)?.object(&["zero", "alpha", "pitch_rate", "elevator"])?;
@@ -175,7 +175,7 @@ fn aerodynamics(place: &Place<'_>) -> Result<Aerodynamics, KeyError> {
     let drag_place = o.required("drag")?;
     let d = drag_place.object(&["parasitic", "oswald", "polar", "pitch_rate", "elevator"])?;
     let drag = match (d.optional("oswald"), d.optional("polar")) {
-        (Some(e), None) => Drag::Oswald(more_than_zero(&e)?),
+        (Some(e), None) => Drag::Linear { factor: size.area / (PI * more_than_zero(&e)? * size.span * size.span) },
         (None, Some(polar)) => match polar.list()?.as_slice() {
             [factor, least] => Drag::Polar { factor: factor.plain()?, least: least.plain()? },
             list => return Err(polar.error(format!("expected [k, CL of least drag], found {} values", list.len()))),
@@ -185,7 +185,7 @@ fn aerodynamics(place: &Place<'_>) -> Result<Aerodynamics, KeyError> {
     let of_drag = |key: &str| if d.optional(key).is_some() { derivative(&d, key, "") } else { Ok(0.0) };
     let stall = o.optional("stall").map(|p| -> Result<Stall, KeyError> {
         let o = p.object(&["sharpness", "angle"])?;
-        Ok(Stall { sharpness: more_than_zero(&o.required("sharpness")?)?, angle: positive(&o, "angle", ANGLE)? })
+        Ok(Stall::new(more_than_zero(&o.required("sharpness")?)?, positive(&o, "angle", ANGLE)?))
     });
     Ok(Aerodynamics {
         lift,
@@ -257,15 +257,20 @@ fn propulsion(place: &Place<'_>) -> Result<Propulsion, KeyError> {
         }
         Ok(Curve::Table(ratios.into_iter().zip(values).map(|(j, c)| [j, c]).collect()))
     };
+    let diameter = positive(&o, "diameter", LENGTH)?;
+    let constant = 1.0 / positive(&o, "speed_constant", Dimension::RATE_PER_VOLTAGE)?;
+    let resistance = positive(&o, "resistance", Dimension::RESISTANCE)?;
     Ok(Propulsion::Motor(Motor {
-        diameter: positive(&o, "diameter", LENGTH)?,
-        constant: 1.0 / positive(&o, "speed_constant", Dimension::RATE_PER_VOLTAGE)?,
-        resistance: positive(&o, "resistance", Dimension::RESISTANCE)?,
+        diameter,
+        constant,
+        resistance,
+        torque_per_volt: constant / resistance,
+        loss: constant / resistance * constant * TAU / diameter,
         no_load_current: si(&o, "no_load_current", Dimension::CURRENT, Range::Any)?,
         voltage: positive(&o, "voltage", Dimension::VOLTAGE)?,
         thrust: curve("thrust", 1.0)?,
         // CQ = CP/2π
-        torque: if table { curve("power", 1.0 / std::f64::consts::TAU)? } else { curve("torque", 1.0)? },
+        torque: if table { curve("power", 1.0 / TAU)? } else { curve("torque", 1.0)? },
         turns,
     }))
 }

@@ -71,15 +71,21 @@ impl Trim {
 }
 
 impl Inertia {
-    /// ω̇ of J ω̇ = M − ω×(Jω) with J = [xx 0 −xz; 0 yy 0; −xz 0 zz].
+    /// xx, yy, zz, xz of J⁻¹ with J = [xx 0 −xz; 0 yy 0; −xz 0 zz].
+    pub fn inverse(&self) -> [f64; 4] {
+        let per_determinant = 1.0 / (self.xx * self.zz - self.xz * self.xz);
+        [self.zz * per_determinant, 1.0 / self.yy, self.xx * per_determinant, self.xz * per_determinant]
+    }
+
+    /// ω̇ of J ω̇ = M − ω×(Jω), with the inverse of J.
     #[inline(always)]
-    pub fn acceleration(&self, moment: [f64; 3], [p, q, r]: [f64; 3]) -> [f64; 3] {
+    pub fn acceleration(&self, inverse: &[f64; 4], moment: [f64; 3], [p, q, r]: [f64; 3]) -> [f64; 3] {
         let [hx, hy, hz] = [self.xx * p - self.xz * r, self.yy * q, self.zz * r - self.xz * p];
         let l = moment[0] - (q * hz - r * hy);
         let m = moment[1] - (r * hx - p * hz);
         let n = moment[2] - (p * hy - q * hx);
-        let per_determinant = 1.0 / (self.xx * self.zz - self.xz * self.xz);
-        [(self.zz * l + self.xz * n) * per_determinant, m / self.yy, (self.xz * l + self.xx * n) * per_determinant]
+        let [xx, yy, zz, xz] = *inverse;
+        [xx * l + xz * n, yy * m, xz * l + zz * n]
     }
 }
 
@@ -102,7 +108,7 @@ impl Airplane {
         let [fx, fy, fz] = wrench.force.map(|f| f / self.mass);
         let ((sf, cf), (st, ct)) = (phi.sin_cos(), theta.sin_cos());
         let g = standard::GRAVITY;
-        let [p_dot, q_dot, r_dot] = self.inertia.acceleration(wrench.moment, [p, q, r]);
+        let [p_dot, q_dot, r_dot] = self.inertia.acceleration(&self.inertia.inverse(), wrench.moment, [p, q, r]);
         [
             fx - g * st - (q * w - r * v),
             fz + g * cf * ct - (p * v - q * u),

@@ -25,6 +25,10 @@ pub struct Motor {
     /// KV, V s/rad: volts per rate, and N m per ampere.
     pub constant: f64,
     pub resistance: f64,
+    /// KV/R, N m/V.
+    pub torque_per_volt: f64,
+    /// KV²/R 2π/D: torque that is lost per w = nD, N s.
+    pub loss: f64,
     pub no_load_current: f64,
     /// At full throttle.
     pub voltage: f64,
@@ -78,11 +82,10 @@ impl Motor {
     /// KV((V_in − KV Ω)/R − i0), Ω = 2πw/D.
     #[inline(always)]
     fn speed(&self, volts: f64, v: f64, density: f64) -> f64 {
-        let Motor { diameter: d, constant: k, resistance, .. } = self;
+        let Motor { diameter: d, constant: k, loss, .. } = self;
         let scale = density * d * d * d;
-        // the motor's torque: that at rest, and what is lost per w
-        let per_resistance = k / resistance;
-        let (rest, loss) = (per_resistance * volts - k * self.no_load_current, per_resistance * k * TAU / d);
+        // the motor's torque at rest
+        let rest = self.torque_per_volt * volts - k * self.no_load_current;
         if let Curve::Quadratic([c0, c1, c2]) = self.torque {
             let (a, b, c) = (scale * c0, scale * c1 * v + loss, scale * c2 * v * v - rest);
             // a motor that the air does not let turn stands still

@@ -4,6 +4,8 @@
 //! the six accelerations vanish, ḣ = V sin γ, and one on the sideways motion. Newton's method from the angles of a
 //! point mass; `numerics::optimize` has no systems of equations.
 
+use std::f64::consts::FRAC_PI_2;
+
 use nalgebra::{SMatrix, SVector};
 
 use super::{AirState, Airplane, Controls};
@@ -91,6 +93,18 @@ type Unknowns = SVector<f64, 8>;
 const SOLVED: f64 = 1e-6;
 
 impl Airplane {
+    /// ```
+    /// use kfdesign::aircraft::airframe::Airplane;
+    /// use kfdesign::aircraft::airframe::trim::{Sideways, TrimRequest, Turn};
+    ///
+    /// let airplane = Airplane::read("data/airplanes/aerosonde.json".as_ref())?;
+    /// let sideways = Sideways::ZeroSideslip;
+    /// let level = TrimRequest { airspeed: 25.0, altitude: 100.0, climb: 0.0, turn: Turn::Rate(0.0), sideways };
+    /// let trim = airplane.trim(&level)?;
+    /// assert!((trim.alpha - 0.053874).abs() < 1e-6);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// Errors: outside the standard atmosphere, or lift, elevator, thrust or another control does not suffice.
     pub fn trim(&self, request: &TrimRequest) -> Result<Trim, TrimError> {
         let air = standard::at(request.altitude).map_err(|e| TrimError::new("request", e.to_string()))?;
@@ -113,13 +127,15 @@ impl Airplane {
         let pressure = 0.5 * air.density * speed * speed * self.size.area;
         let needed = self.mass * g * request.climb.cos() / (pressure * bank.cos());
         let lift = &self.aerodynamics.lift;
-        // the wing alone does not carry the airplane: said where thrust cannot make up for it, or no steady flight is
+        // wing and elevator do not carry the airplane: said where thrust cannot make up for it, or no steady flight is
         // found
         let mut too_slow = None;
         if let Some(stall) = self.aerodynamics.stall {
-            let most = (0..200)
-                .map(|i| self.aerodynamics.lift_and_drag(&self.size, stall.angle * f64::from(i) / 150.0, 0.0, 0.0).0)
-                .fold(0.0, f64::max);
+            let greatest = |elevator: &dyn Fn(f64) -> f64| {
+                let angles = (0..200).map(|i| stall.angle * f64::from(i) / 150.0);
+                angles.map(|a| self.aerodynamics.lift_and_drag(a, 0.0, elevator(a)).0).fold(0.0, f64::max)
+            };
+            let (wing, most) = (greatest(&|_| 0.0), greatest(&|alpha| self.balancing(alpha)));
             // a wing near its stall is helped by the part of the thrust that points up
             let thrust = self.propulsion.running(self.propulsion.greatest(), speed, air.density).thrust;
             let turn = match bank {
@@ -129,11 +145,11 @@ impl Airplane {
             let error = TrimError::new(
                 "lift",
                 format!(
-                    "no lift: {speed} m/s{turn} needs a lift coefficient of {needed:.2}, the wing stalls at {most:.2}; \
+                    "no lift: {speed} m/s{turn} needs a lift coefficient of {needed:.2}, it stalls at {most:.2}; \
                      fly faster or turn less"
                 ),
             );
-            if needed > most + (thrust * (stall.angle + request.climb).sin() / pressure).max(0.0) {
+            if needed > wing.max(most) + (thrust * (stall.angle + request.climb).sin() / pressure).max(0.0) {
                 return Err(error);
             }
             too_slow = (needed > most).then_some(error);
@@ -163,10 +179,20 @@ impl Airplane {
                 Err(error)
             }
             _ => {
-                let drag = pressure * self.aerodynamics.lift_and_drag(&self.size, alpha, 0.0, 0.0).1;
+                let drag = pressure * self.aerodynamics.lift_and_drag(alpha, 0.0, 0.0).1;
                 self.judge(&x, r, drag + self.mass * g * request.climb.sin(), request, air.density)
             }
         }
+    }
+
+    /// The elevator (rad), within its stops, that balances the pitching moment without rotation.
+    fn balancing(&self, alpha: f64) -> f64 {
+        let pitch = &self.aerodynamics.pitch;
+        let [least, greatest] = self.actuators[0].map_or([-FRAC_PI_2, FRAC_PI_2], |actuator| actuator.travel);
+        if pitch.elevator == 0.0 {
+            return 0.0;
+        }
+        (-(pitch.zero + pitch.alpha * alpha) / pitch.elevator).clamp(least, greatest)
     }
 
     /// From a start to where no step of Newton's method makes it better, and what remains there.
@@ -209,7 +235,7 @@ impl Airplane {
         let ((sf, cf), (st, ct)) = (trim.phi.sin_cos(), trim.theta.sin_cos());
         let g = standard::GRAVITY;
         let f = wrench.force.map(|f| f / self.mass);
-        let [p_dot, q_dot, r_dot] = self.inertia.acceleration(wrench.moment, trim.rate);
+        let [p_dot, q_dot, r_dot] = self.inertia.acceleration(&self.inertia.inverse(), wrench.moment, trim.rate);
         let climb = u * st - v * sf * ct - w * cf * ct;
         Unknowns::from([
             f[0] - g * st - (q * w - r * v),

@@ -210,10 +210,8 @@ impl Dryden {
     }
 }
 
-/// The independent parts of the state: first state and length.
+/// The independent parts of the state, those of u, w and q, v and r, p: first state and length.
 pub const PARTS: [(usize, usize); 4] = [(0, 1), (1, 3), (4, 3), (7, 1)];
-/// Which gusts of u v w p q r each part makes.
-pub(super) const OUTPUTS: [&[usize]; 4] = [&[0], &[2, 4], &[1, 5], &[3]];
 
 /// x⁺ = F x + v, v ~ N(0, Q), exact over a step.
 #[derive(Clone, Debug, PartialEq)]

@@ -50,6 +50,12 @@ pub fn at_geopotential(height: f64) -> Result<Air, AirError> {
 }
 
 /// Air at a geometric height, m. Errors: outside −2 to 20 km of geopotential height.
+///
+/// ```
+/// let air = kfdesign::aircraft::atmosphere::standard::at(0.0)?;
+/// assert!((air.density - 1.225).abs() < 1e-6);
+/// # Ok::<(), kfdesign::aircraft::atmosphere::standard::AirError>(())
+/// ```
 pub fn at(height: f64) -> Result<Air, AirError> {
     at_geopotential(geopotential(height))
 }

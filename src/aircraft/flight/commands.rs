@@ -5,11 +5,22 @@ use std::path::Path;
 use super::FlightError;
 use super::document::ControlsEntry;
 use super::surfaces::CONTROLS;
+use crate::aircraft::airframe::{Airplane, Propulsion};
 use crate::params::Measured;
 use crate::units::{Dimension, Unit};
 
-/// Names of the controls in documents and files.
-pub(super) const NAMES: [&str; CONTROLS] = ["elevator", "aileron", "rudder", "throttle"];
+/// Names of the surfaces in documents and files.
+pub(super) const SURFACES: [&str; 3] = ["elevator", "aileron", "rudder"];
+
+/// Names of all controls of an airplane.
+pub(super) fn names(airplane: &Airplane) -> [&'static str; CONTROLS] {
+    let [elevator, aileron, rudder] = SURFACES;
+    let propulsion = match airplane.propulsion {
+        Propulsion::Motor(_) => "throttle",
+        Propulsion::Thrust { .. } => "thrust",
+    };
+    [elevator, aileron, rudder, propulsion]
+}
 
 /// SI; each row holds until the next.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -26,21 +37,29 @@ impl Commands {
     }
 }
 
-/// `trim`: what is not given; `None` refuses that. Errors: a control nobody gives, a file that cannot be read or ends
-/// before `duration` (s).
+/// `trim`: what is not given; `None` refuses that. Errors: a control nobody gives or that the airplane does not have, a
+/// file that cannot be read or ends before `duration` (s).
 pub(super) fn read(
     entry: &ControlsEntry,
     folder: &Path,
+    airplane: &Airplane,
     trim: Option<[f64; CONTROLS]>,
     duration: f64,
 ) -> Result<Commands, FlightError> {
     let angle = |m: &Option<Measured>| m.as_ref().map(Measured::si);
-    let throttle = entry.throttle.or(angle(&entry.thrust));
+    let names = names(airplane);
+    let (throttle, other) = match airplane.propulsion {
+        Propulsion::Motor(_) => (entry.throttle, entry.thrust.as_ref().map(|_| "thrust")),
+        Propulsion::Thrust { .. } => (angle(&entry.thrust), entry.throttle.map(|_| "throttle")),
+    };
+    if let Some(other) = other {
+        return Err(FlightError(format!("controls.{other}: this airplane has none; give its {}", names[3])));
+    }
     let given = [angle(&entry.elevator), angle(&entry.aileron), angle(&entry.rudder), throttle];
-    let table = entry.file.as_ref().map(|file| table(&folder.join(file))).transpose()?;
+    let table = entry.file.as_ref().map(|file| table(&folder.join(file), names)).transpose()?;
     let in_file = |i: usize| table.as_ref().and_then(|t| t.columns[i]);
     let mut fixed = [0.0; CONTROLS];
-    for (i, name) in NAMES.iter().enumerate() {
+    for (i, name) in names.iter().enumerate() {
         if let (Some(_), Some(file)) = (given[i].and(in_file(i)), &entry.file) {
             return Err(FlightError(format!("controls.{name}: stands in {} too; give it once", file.display())));
         }
@@ -80,7 +99,7 @@ struct Table {
 }
 
 /// A csv with a header of names and units, `time (s),elevator (deg)`.
-fn table(path: &Path) -> Result<Table, FlightError> {
+fn table(path: &Path, names: [&str; CONTROLS]) -> Result<Table, FlightError> {
     let shown = path.display().to_string();
     let fail = |what: String| FlightError(format!("{shown}: {what}"));
     let text = std::fs::read_to_string(path).map_err(|e| fail(format!("cannot read: {e}")))?;
@@ -96,16 +115,17 @@ fn table(path: &Path) -> Result<Table, FlightError> {
             Some((name, unit)) => (name.trim(), Some(unit.trim_end_matches(')').trim())),
             None => (cell, None),
         };
-        let control = NAMES.iter().position(|known| *known == name);
+        let control = names.iter().position(|known| *known == name);
         let dimension = match (name, control) {
             ("time", _) => Dimension::TIME,
-            (_, Some(3)) => {
-                columns[3] = Some(i);
+            ("thrust", Some(_)) => Dimension::FORCE,
+            ("throttle", Some(place)) => {
+                columns[place] = Some(i);
                 scales.push(1.0);
                 continue;
             }
             (_, Some(_)) => Dimension::new(2, 0, 0),
-            _ => return Err(fail(format!("column '{cell}' is not known; known are time, {}", NAMES.join(", ")))),
+            _ => return Err(fail(format!("column '{cell}' is not known; known are time, {}", names.join(", ")))),
         };
         let example = dimension.example();
         let unit = unit.ok_or_else(|| fail(format!("column '{cell}' says no unit; write '{name} ({example})'")))?;

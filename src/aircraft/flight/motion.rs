@@ -26,8 +26,9 @@ pub(super) struct World<'a> {
     pub earth: Earth,
     /// Velocity of the air over the ground, north, east, down, m/s.
     pub wind: Vector,
-    /// Of the mass, 1/kg.
+    /// Of the mass, 1/kg, and of the inertia.
     per_mass: f64,
+    inverse_inertia: [f64; 4],
 }
 
 /// Everything of an instant that sensors or rows need, besides the state.
@@ -67,7 +68,7 @@ pub(super) fn inertial_rate(x: &State) -> Vector {
 
 impl<'a> World<'a> {
     pub(super) fn new(airplane: &'a Airplane, earth: Earth, wind: Vector) -> World<'a> {
-        World { airplane, earth, wind, per_mass: 1.0 / airplane.mass }
+        World { airplane, earth, wind, per_mass: 1.0 / airplane.mass, inverse_inertia: airplane.inertia.inverse() }
     }
 
     /// Velocity through the steady air, body axes.
@@ -90,11 +91,10 @@ impl<'a> World<'a> {
         let wrench = self.airplane.forces(&air, controls, density.at(field.height));
         let specific_force = wrench.force.map(|f| f * self.per_mass);
         let accelerated = plus(plus(specific_force, field.gravity), cross(v, plus(inertial, field.rate)));
-        let turned = self.airplane.inertia.acceleration(wrench.moment, inertial);
+        let turned = self.airplane.inertia.acceleration(&self.inverse_inertia, wrench.moment, inertial);
         let moved = times(&c, v);
         let [e0, e1, e2, e3] = e;
         let [p, q, r] = rate;
-        let airspeed = dot(through_air, through_air).sqrt();
         let derivative = [
             moved[0],
             moved[1],
@@ -110,7 +110,7 @@ impl<'a> World<'a> {
             turned[1],
             turned[2],
             // through the air at large: gusts lie along this way
-            if gust.velocity == [0.0; 3] { airspeed } else { norm(minus(v, wind)) },
+            norm(minus(v, wind)),
         ];
         Instant { derivative, specific_force, rate, air, height: field.height }
     }
@@ -127,18 +127,16 @@ pub(super) trait Rate {
     fn rate(&self, part: usize, x: &State) -> State;
 }
 
-/// One step of the classical Runge–Kutta method (order 4). The quaternion is made a unit one again.
+/// One step of the classical Runge–Kutta method (order 4). The quaternion is made a unit one again. `first`: the
+/// derivative at the beginning, where it is known.
 #[inline(always)]
-pub(super) fn step(x: &State, h: f64, of: &impl Rate) -> State {
-    let (mut at, mut sum) = (*x, [0.0; STATES]);
-    for (part, weight, ahead) in [(0, 1.0, 0.5), (1, 2.0, 0.5), (1, 2.0, 1.0), (2, 1.0, 0.0)] {
-        let k = of.rate(part, &at);
-        for i in 0..STATES {
-            sum[i] += weight * k[i];
-            at[i] = x[i] + ahead * h * k[i];
-        }
-    }
-    let mut next: State = std::array::from_fn(|i| x[i] + h / 6.0 * sum[i]);
+pub(super) fn step(x: &State, h: f64, first: Option<State>, of: &impl Rate) -> State {
+    let ahead = |by: f64, k: &State| -> State { std::array::from_fn(|i| x[i] + by * k[i]) };
+    let a = first.unwrap_or_else(|| of.rate(0, x));
+    let b = of.rate(1, &ahead(0.5 * h, &a));
+    let c = of.rate(1, &ahead(0.5 * h, &b));
+    let d = of.rate(2, &ahead(h, &c));
+    let mut next: State = std::array::from_fn(|i| x[i] + h / 6.0 * (a[i] + 2.0 * (b[i] + c[i]) + d[i]));
     let per_length = 1.0 / next[6..10].iter().map(|e| e * e).sum::<f64>().sqrt();
     next[6..10].iter_mut().for_each(|e| *e *= per_length);
     next

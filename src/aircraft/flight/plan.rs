@@ -170,7 +170,7 @@ impl Plan {
             airspeed_position: airplane.position("airspeed"),
             gnss_antenna: airplane.position("gnss"),
         };
-        let commands = commands::read(&document.controls, folder, controls, times.duration)?;
+        let commands = commands::read(&document.controls, folder, &airplane, controls, times.duration)?;
         let [elevator, aileron, rudder, _] = commands.fixed;
         let reference = Reference { surfaces: [elevator, aileron, rudder], ..reference };
         let autopilot = autopilot(document, &airplane, reference, &grid, sensors.attitude.is_some())?;

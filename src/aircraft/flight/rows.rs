@@ -1,7 +1,7 @@
 //! The columns of a flight: truth, controls, gusts, measurements, and the truth of the inertial sensors.
 
 use super::FlightError;
-use super::commands::NAMES;
+use super::commands::SURFACES;
 use super::earth::{Earth, Geodetic};
 use super::motion::{Instant, State, attitude, inertial_rate, position, velocity};
 use super::plan::{Plan, point};
@@ -147,7 +147,7 @@ pub(super) fn header(plan: &Plan) -> Vec<String> {
     names.extend(BODY[..3].iter().map(|(name, unit)| format!("{name} ({unit})")));
     names.extend(ANGLES.map(|name| format!("{name} (rad)")));
     names.extend(BODY[3..].iter().map(|(name, unit)| format!("{name} ({unit})")));
-    names.extend(NAMES[..3].iter().map(|name| format!("{name} (rad)")));
+    names.extend(SURFACES.iter().map(|name| format!("{name} (rad)")));
     names.push(super::start::throttle_column(&plan.airplane).to_string());
     if plan.has_gusts() {
         names.extend(BODY.map(|(name, unit)| format!("gust_{name} ({unit})")));
@@ -183,7 +183,7 @@ pub(super) fn header(plan: &Plan) -> Vec<String> {
             names.extend(AXES.iter().flat_map(|axis| of(axis)));
         }
     }
-    names.extend(NAMES[..3].iter().map(|name| format!("{name}_rate (rad/s)")));
+    names.extend(SURFACES.iter().map(|name| format!("{name}_rate (rad/s)")));
     names
 }
 

@@ -41,30 +41,25 @@ impl Servo {
     /// The same; `known` is the motion of the call before, which serves again when the time is the same.
     #[inline(always)]
     pub(super) fn advance_again(&self, state: &mut ServoState, command: f64, dt: f64, known: &mut Option<Motion>) {
-        let motion = match known {
-            Some(motion) if motion.time == dt => motion,
-            _ => {
-                let parts = (self.frequency * dt / LONGEST_TURN).ceil().max(1.0);
-                known.insert(Motion { time: dt, parts: parts as u64, part: self.transition(dt / parts) })
-            }
-        };
-        for _ in 0..motion.parts {
-            self.advance_part(state, command, &motion.part);
-        }
-    }
-
-    #[inline(always)]
-    fn advance_part(&self, state: &mut ServoState, command: f64, whole: &Transition) {
-        // quick: far from every limit from the beginning to the end
-        let (start, end) = (*state, whole.apply(*state, command));
-        let accelerations = [start, end].map(|s| self.acceleration(s, command).abs());
-        let fastest = start.rate.abs().max(end.rate.abs()) + accelerations[0].max(accelerations[1]) * whole.dt;
-        let room = |s: ServoState| (self.travel[1] - s.angle).min(s.angle - self.travel[0]);
-        if fastest < self.rate_limit && room(start).min(room(end)) > fastest * whole.dt {
-            *state = end;
+        if !self.meets_no_limit(*state, command) {
+            let parts = (self.frequency * dt / LONGEST_TURN).ceil().max(1.0);
+            (0..parts as u64).for_each(|_| self.advance_limited(state, command, dt / parts));
             return;
         }
-        self.advance_limited(state, command, whole.dt);
+        let motion = match known {
+            Some(motion) if motion.dt == dt => motion,
+            _ => known.insert(self.motion(dt)),
+        };
+        *state = motion.apply(*state, command);
+    }
+
+    /// Whatever the time: ω²(δ − δc)² + v² never grows, its derivative being −4ζω v², and bounds both.
+    #[inline(always)]
+    fn meets_no_limit(&self, state: ServoState, command: f64) -> bool {
+        let turned = self.frequency * (state.angle - command);
+        let most = turned * turned + state.rate * state.rate;
+        let room = self.frequency * (self.travel[1] - command).min(command - self.travel[0]);
+        most < self.rate_limit * self.rate_limit && room > 0.0 && most < room * room
     }
 
     /// Through the regimes that limits make.
@@ -166,46 +161,42 @@ impl Servo {
 
     /// Without limits.
     fn linear(&self, state: ServoState, command: f64, dt: f64) -> ServoState {
-        self.transition(dt).apply(state, command)
+        self.motion(dt).apply(state, command)
     }
 
     /// The linear motion over a time.
-    fn transition(&self, dt: f64) -> Transition {
-        let (w, z) = (self.frequency, self.damping);
-        let decay = (-z * w * dt).exp();
-        // e(t) = e^(−ζωt)(e c + (v + ζω e) s), c = cos ωd t and s = sin(ωd t)/ωd, or their limits and hyperbolic forms
-        let square = 1.0 - z * z;
-        let (c, s) = if square > 1e-12 {
-            let wd = w * square.sqrt();
-            let (sin, cos) = (wd * dt).sin_cos();
-            (cos, sin / wd)
-        } else if square < -1e-12 {
+    fn motion(&self, dt: f64) -> Motion {
+        let (w, square) = (self.frequency, 1.0 - self.damping * self.damping);
+        let z = self.damping * w;
+        // e(t) = e c + (v + ζω e) s, c = e^(−ζωt) cos ωd t and s = e^(−ζωt) sin(ωd t)/ωd, or their limits and
+        // hyperbolic forms, these without large numbers
+        let (c, s) = if square < -1e-12 {
             let wd = w * (-square).sqrt();
-            ((wd * dt).cosh(), (wd * dt).sinh() / wd)
+            let slow = ((wd - z) * dt).exp();
+            let fall = (-2.0 * wd * dt).exp_m1();
+            (slow * (1.0 + 0.5 * fall), -0.5 * slow * fall / wd)
         } else {
-            (1.0, dt)
+            let decay = (-z * dt).exp();
+            if square > 1e-12 {
+                let wd = w * square.sqrt();
+                let (sin, cos) = (wd * dt).sin_cos();
+                (decay * cos, decay * sin / wd)
+            } else {
+                (decay, decay * dt)
+            }
         };
-        let z = z * w;
-        Transition { dt, m: [[decay * (c + z * s), decay * s], [-decay * w * w * s, decay * (c - z * s)]] }
+        Motion { dt, m: [[c + z * s, s], [-w * w * s, c - z * s]] }
     }
-}
-
-/// A time in equal parts, each with its linear motion.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Motion {
-    time: f64,
-    parts: u64,
-    part: Transition,
 }
 
 /// (δ − δc, v) after a time, a matrix by rows.
 #[derive(Clone, Copy, Debug)]
-struct Transition {
+pub(super) struct Motion {
     dt: f64,
     m: [[f64; 2]; 2],
 }
 
-impl Transition {
+impl Motion {
     fn apply(&self, state: ServoState, command: f64) -> ServoState {
         let [[a, b], [c, d]] = self.m;
         let (e, v) = (state.angle - command, state.rate);

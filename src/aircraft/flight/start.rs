@@ -1,10 +1,11 @@
 //! From the document to the airplane and the state it starts in.
 
+use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
 use super::FlightError;
 use super::autopilot::Reference;
-use super::commands::{Commands, NAMES};
+use super::commands::{Commands, names};
 use super::document::{EarthEntry, FlightDocument, TrimEntry};
 use super::earth::{Earth, Geodetic};
 use super::motion::State;
@@ -52,11 +53,17 @@ pub(super) fn trim(entry: &TrimEntry, airplane: &Airplane) -> Result<Trim, Fligh
     airplane.trim(&entry.request()).map_err(|e| FlightError(format!("trim: {e}")))
 }
 
-/// Fixed commands and rows stay within the stops. Errors: the first that does not.
+/// Fixed commands and rows stay within the stops, and within what the propulsion has. Errors: the first that does not.
 pub(super) fn check_travel(airplane: &Airplane, commands: &Commands) -> Result<(), FlightError> {
     let rows = commands.rows.iter().map(|(_, row)| row);
     for row in std::iter::once(&commands.fixed).chain(rows) {
-        for (i, (command, name)) in row.iter().zip(NAMES).enumerate() {
+        let greatest = airplane.propulsion.greatest();
+        let propulsion = row[CONTROLS - 1];
+        if !(0.0..=greatest).contains(&propulsion) {
+            let name = names(airplane)[CONTROLS - 1];
+            return Err(FlightError(format!("controls.{name}: {propulsion} is not from 0 to {greatest}")));
+        }
+        for (i, (command, name)) in row.iter().zip(names(airplane)).enumerate() {
             let Some(Servo { travel: [least, greatest], .. }) = servo_of(airplane, i).0 else { continue };
             if !(least..=greatest).contains(command) {
                 return Err(FlightError(format!(
@@ -118,6 +125,9 @@ pub(super) fn start(
             place[1].ok_or_else(|| missing("earth.wgs84.longitude"))?,
         ),
     };
+    if latitude.abs() > FRAC_PI_2 {
+        return Err(FlightError(format!("latitude: {:.3} deg, expected -90 to 90 deg", latitude.to_degrees())));
+    }
     let state = state_of(earth, Geodetic { latitude, longitude, height }, euler, velocity, rate);
     let (rate, angles) = trimmed.unwrap_or((rate, [euler[0], euler[1]]));
     let reference = Reference { rate, angles, surfaces: [0.0; 3] };

@@ -210,7 +210,7 @@ fn without_threads_the_work_goes_on_with_one() {
     ] {
         let usual = bench.run(&args);
         let out = Command::new(env!("CARGO_BIN_EXE_kfdesign"))
-            .args(args.split_whitespace())
+            .args(args.split_whitespace().chain(["-v"]))
             .current_dir(bench.path("."))
             .env("RUST_MIN_STACK", (1u64 << 60).to_string())
             .output()

@@ -135,7 +135,7 @@ fn run_block(bench: &Bench, page: &Page, block: &Fence) -> String {
             w if w[0] == "cargo" || w[0] == "git" || w[0] == "bash" => continue,
             _ => panic!("{}: do not know how to run '{command}'", page.path.display()),
         };
-        let out = bench.run_args(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
+        let out = bench.as_typed(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
         assert_eq!(
             out.status,
             status,
@@ -225,6 +225,7 @@ true_pages! {
     low_pass: "docs/low-pass.md",
     noise_models: "docs/noise-models.md",
     plants: "docs/plants.md",
+    quickstart: "docs/quickstart.md",
     tour: "docs/tour.md",
     tuning: "docs/tuning.md",
     ulog_to_ekf2: "docs/ulog-to-ekf2.md",

@@ -6,6 +6,7 @@
 
 mod aircraft;
 mod allan;
+mod answers;
 mod architecture;
 mod attitude;
 mod bad_input;

@@ -404,9 +404,9 @@ fn print_halves(label: &str, path: &str, flags: &'static str, [from, to]: [f64; 
             json(&run(&bench, "identify", &[path], &log, &all))
         };
         let mut found = identify(&[]);
-        let outliers = |axis: &Value| axis["warnings"].to_string().contains("`robust` leaves them out");
+        let outliers = |axis: &Value| axis["warnings"].to_string().contains("`without_outliers` leaves them out");
         if found["axes"].as_array().unwrap().iter().any(outliers) {
-            found = identify(&["--robust"]);
+            found = identify(&["--without-outliers"]);
         }
         let tune = bench.run("tune params.json -o filter.json");
         assert!(tune.status < 2, "{label}: {}", tune.stderr);

@@ -1,6 +1,9 @@
 //! Requests: what the library makes of one is what the command prints, and what is no request is refused in one line.
 
-use kfdesign::ops::{allan, compare, identify, inflate, plan, replay, simulate, tune};
+use kfdesign::ops::{
+    airplane, allan, compare, datasheet, export, fly, identify, import, inflate, info, montecarlo, plan, replay,
+    simulate, trim, tune,
+};
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -68,6 +71,70 @@ fn a_request_gives_what_the_command_prints() {
         panic!("the filter is linear")
     };
     same("replay", &result, &bench.run(&format!("replay {filter} {log} --alpha 0.02 --json")).stdout);
+}
+
+/// Many runs and one document of them; parameters of other programs, and for them.
+#[test]
+fn a_request_judges_imports_and_exports_as_the_command_does() {
+    let bench = Bench::new();
+    let at = |name: &str| bench.path(name).display().to_string();
+    let params = data("params.json").display().to_string();
+    let (filter, shard) = (at("filter.json"), at("shard.json"));
+    bench.ok(&format!("tune {params} -o {filter}"));
+    let asked =
+        montecarlo::Request { output: None, ..request(json!({ "filter": filter, "runs": "20", "threads": 2 })) };
+    let montecarlo::Done::Many(simulated) = montecarlo::run(&asked, &|| false).unwrap() else {
+        panic!("these are many runs")
+    };
+    let judged = simulated.judge(&asked.judging).unwrap();
+    let allowed = "--allow-inconclusive";
+    assert_eq!(judged.json, bench.ok(&format!("montecarlo {filter} --runs 20 -o {shard} --json {allowed}")));
+    let asked: montecarlo::merge::Request = request(json!({ "shards": [shard], "judging": { "power": true } }));
+    let judged = montecarlo::merge::run(&asked).unwrap().judge(&asked.judging).unwrap();
+    assert_eq!(judged.json, bench.ok(&format!("merge {shard} --power --json {allowed}")));
+    let to_kalibr = json!({ "params": params, "to": "kalibr", "rate": 200.0 });
+    let exported = export::run(&request(to_kalibr)).unwrap();
+    assert_eq!(exported.files[0].text, bench.ok(&format!("export {params} --to kalibr --rate 200")));
+    let to_c = json!({ "params": filter, "to": "c", "output": at("drift.c"), "code": { "precision": "double" } });
+    let exported = export::run(&request(to_c)).unwrap();
+    assert!(!bench.files().iter().any(|name| name.starts_with("drift")), "nothing is written by a request");
+    bench.ok(&format!("export {filter} --to c --precision double -o {}", at("drift.c")));
+    for file in &exported.files {
+        assert_eq!(file.text, std::fs::read_to_string(file.path.as_ref().unwrap()).unwrap());
+    }
+    assert_eq!(exported.files.len(), 3);
+    let yaml = at("imu.yaml");
+    bench.ok(&format!("export {params} --to kalibr -o {yaml}"));
+    let imported = import::run(&request(json!({ "file": yaml }))).unwrap();
+    same("import", &imported.sensors[0], &bench.ok(&format!("import {yaml} --json")));
+    let sheet = json!({ "angle_random_walk": "0.13 deg/sqrt(h)", "bias_instability": "2.3 deg/h", "rate": 100.0 });
+    let read = datasheet::run(&request(sheet)).unwrap();
+    let command = ["datasheet", "--angle-random-walk", "0.13 deg/sqrt(h)", "--bias-instability", "2.3 deg/h"];
+    let printed = bench.run_args(&[&command[..], &["--rate", "100", "--json"]].concat());
+    same("datasheet", &read.sensors[0], &printed.stdout);
+}
+
+/// An airplane, its steady flight, a flight and what is in its log.
+#[test]
+fn a_request_flies_as_the_command_does() {
+    let bench = Bench::new();
+    let airplane = data("airplanes/aerosonde.json").display().to_string();
+    let flight = data("flights/aerosonde.json").display().to_string();
+    let log = bench.path("flight.csv").display().to_string();
+    let check = airplane::run(&request(json!({ "airplane": airplane, "altitude": "100 m" }))).unwrap();
+    same("airplane", &check, &bench.run_args(&["airplane", &airplane, "--altitude", "100 m", "--json"]).stdout);
+    let done = trim::run(&request(json!({ "file": flight, "speed": "22 m/s", "lateral": "wings_level" }))).unwrap();
+    let command = ["trim", &flight, "--speed", "22 m/s", "--lateral", "wings_level", "--json"];
+    same("trim", &done.document, &bench.run_args(&command).stdout);
+    let said = |value| format!("{:#}", trim::run(&request(value)).err().unwrap());
+    let found = said(json!({ "file": flight, "turn_rate": "1 deg/s", "bank": "3 deg" }));
+    assert_eq!(found, "`turn_rate` and `bank` both say how it turns: give one of them");
+    let found = said(json!({ "file": flight, "lateral": "straight" }));
+    assert!(found.starts_with("`lateral` straight: expected one of zero_sideslip"), "{found}");
+    let done = fly::run(&request(json!({ "flight": flight, "output": log, "duration": "2s" })), true).unwrap();
+    assert!(done.lines.is_some());
+    same("fly", &done.report, &bench.ok(&format!("fly {flight} -o {log} --duration 2s --json")));
+    same("info", &info::run(&request(json!({ "log": log }))).unwrap(), &bench.ok(&format!("info {log} --json")));
 }
 
 #[test]

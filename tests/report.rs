@@ -594,7 +594,6 @@ fn page_is_self_contained() {
 fn a_page_has_every_level_and_a_sheet_the_figures_above_the_page() {
     let svg = |name: &str| gallery().into_iter().find(|figure| figure.0 == name).unwrap().1;
     let section = Section::of_page("Heading")
-        .at(Level::Brief)
         .paragraph("the answer")
         .at(Level::Page)
         .paragraph("the rest")

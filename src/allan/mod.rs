@@ -134,6 +134,18 @@ pub enum AllanError {
 /// at each point. [`AllanCurve::refine`] replaces them by the exact ones of a fitted mixture.
 ///
 /// `rate` without gaps, `dt` in s. Fails on fewer samples than one difference needs and on NaN or infinite samples.
+///
+/// ```
+/// use kfdesign::allan::{Deviation, TauGrid, curve};
+///
+/// // a ramp r(t) = R t has the deviation R τ/√2
+/// let ramp: Vec<f64> = (0..4096).map(|k| 2e-3 * k as f64 * 0.01).collect();
+/// let curve = curve(&ramp, 0.01, Deviation::Oadev, TauGrid::Octave)?;
+/// for point in &curve.points {
+///     assert!((point.deviation / (2e-3 * point.tau_s / 2_f64.sqrt()) - 1.0).abs() < 1e-9);
+/// }
+/// # Ok::<(), kfdesign::allan::AllanError>(())
+/// ```
 pub fn curve(rate: &[f64], dt: f64, deviation: Deviation, grid: TauGrid) -> Result<AllanCurve, AllanError> {
     check(rate, deviation, 0)?;
     curve_of(&deviation::phase(rate, dt), dt, deviation, grid)

@@ -25,15 +25,18 @@ pub struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
-    files::check(&[("-o", &args.output, Kind::Json), ("--plot", &args.plot, Kind::Svg)], &[&args.request.log])?;
+    let outputs = [("-o", &args.output, Kind::Json), ("--plot", &args.plot, Kind::Svg)];
+    files::check(&outputs, &[&args.request.log])?;
     let done = allan(&args.request)?;
     files::write_json(args.output.as_deref(), &done.document)?;
-    let report = view::allan::allan(&done.name, &done.axes);
+    let mut report = view::allan::allan(&done.name, &done.axes);
     files::write_plot(args.plot.as_deref(), &format!("{}: {}", done.name, done.document.deviation.name()), &report)?;
     if args.json {
         print_json(&done.document)?;
     } else {
-        print_report(&report);
+        report.written = files::written(&outputs);
+        report.next = Some(format!("kfdesign identify {} -o params.json", done.name));
+        print_report(&report, Status::Done);
     }
     Ok(Status::Done)
 }

@@ -15,9 +15,8 @@ use crate::view;
 /// and beyond what is tolerated. Exit status 1 when the verdict is inconsistent, or inconclusive without
 /// --allow-inconclusive.
 #[derive(Debug, clap::Args)]
-#[command(
-    after_help = "Examples: kfdesign compare params.json other_day.csv --report compare.html; kfdesign compare imu.yaml log.bag --parameters"
-)]
+#[command(after_help = "Examples: kfdesign compare params.json other_day.csv --report compare.html; kfdesign compare \
+                  imu.yaml log.bag --parameters")]
 pub struct Args {
     #[command(flatten)]
     request: Request,
@@ -43,13 +42,15 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     files::check(&outputs, &[&args.request.params, &args.request.log])?;
     let (result, unit) = compare(&args.request)?;
     files::write_json(args.output.as_deref(), &result)?;
-    let report = view::compare::compare(&result, &unit);
+    let mut report = view::compare::compare(&result, &unit);
     files::write_plot(args.plot.as_deref(), "Model and log", &report)?;
     files::write_page(args.report.as_deref(), &report)?;
+    let status = args.judging.status([result.verdict]);
     if args.json {
         print_json(&result)?;
     } else {
-        print_report(&report);
+        report.written = files::written(&outputs);
+        print_report(&report, status);
     }
-    Ok(args.judging.status([result.verdict]))
+    Ok(status)
 }

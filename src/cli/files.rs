@@ -93,6 +93,13 @@ pub(super) fn check(outputs: &[Output<'_>], inputs: &[&Path]) -> anyhow::Result<
     }
 }
 
+/// What there is to say of outputs that are written.
+pub(super) fn written(outputs: &[Output<'_>]) -> Vec<String> {
+    let names: Vec<String> =
+        outputs.iter().filter_map(|output| Some(output.1.as_ref()?.display().to_string())).collect();
+    if names.is_empty() { Vec::new() } else { vec![format!("{} written", names.join(", "))] }
+}
+
 /// A document, where a file for it is named.
 pub(super) fn write_json<T: Serialize>(path: Option<&Path>, document: &T) -> anyhow::Result<()> {
     let Some(path) = path else { return Ok(()) };

@@ -43,15 +43,21 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if let Some(path) = &args.output {
         atomic::write(path, done.params.to_json().as_bytes())?;
     }
-    let report = view::identify::identify(&done.params, &done.axes, done.shared.as_ref());
+    let mut report = view::identify::identify(&done.params, &done.axes, done.shared.as_ref());
     files::write_plot(args.plot.as_deref(), &format!("{}: overlapping Allan deviation", done.name()), &report)?;
     files::write_page(args.report.as_deref(), &report)?;
+    let status = status(&done.params, args.output.as_deref());
     if args.json {
         print_json(&done.document())?;
     } else {
-        print_report(&report);
+        report.written = files::written(&outputs);
+        report.next = Some(match &args.output {
+            Some(path) => format!("kfdesign tune {}", path.display()),
+            None => "the same with -o params.json, then kfdesign tune params.json".into(),
+        });
+        print_report(&report, status);
     }
-    Ok(status(&done.params, args.output.as_deref()))
+    Ok(status)
 }
 
 /// A failed check is said on stderr, in one line.

@@ -26,7 +26,8 @@ pub struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
-    files::check(&[("-o", &args.output, Kind::Json)], &[&args.request.params, &args.request.log])?;
+    let outputs = [("-o", &args.output, Kind::Json)];
+    files::check(&outputs, &[&args.request.params, &args.request.log])?;
     let done = inflate(&args.request)?;
     if let Some(path) = &args.output {
         atomic::write(path, done.params.to_json().as_bytes())?;
@@ -34,7 +35,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if args.json {
         print_json(&done.found)?;
     } else {
-        print_report(&view::inflate::inflate(&done.found, &done.unit));
+        let mut report = view::inflate::inflate(&done.found, &done.unit);
+        report.written = files::written(&outputs);
+        print_report(&report, Status::Done);
     }
     Ok(Status::Done)
 }

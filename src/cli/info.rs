@@ -1,10 +1,8 @@
 //! `kfdesign info`.
 
-use std::path::PathBuf;
-
 use super::Status;
 use super::output::{print_json, print_report};
-use crate::input::inspect::inspect;
+use crate::ops::info::{Request, run as info};
 use crate::view;
 
 /// What is in a log: its topics, columns, units, rates and spans
@@ -13,8 +11,8 @@ use crate::view;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: kfdesign info flight.ulg")]
 pub struct Args {
-    /// A log of any format that is read
-    log: PathBuf,
+    #[command(flatten)]
+    request: Request,
     /// Every topic with all its columns, not only those with a gyro or an accelerometer
     #[arg(long)]
     all: bool,
@@ -24,11 +22,11 @@ pub struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
-    let found = inspect(&args.log)?;
+    let found = info(&args.request)?;
     if args.json {
         print_json(&found)?;
     } else {
-        print_report(&view::info::info(&args.log.display().to_string(), &found, args.all));
+        print_report(&view::info::info(&args.request.log.display().to_string(), &found, args.all), Status::Done);
     }
     Ok(Status::Done)
 }

@@ -28,11 +28,13 @@ pub mod tune;
 
 use std::ffi::OsString;
 
-use clap::{Parser, Subcommand};
+use clap::error::ErrorKind;
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
-use self::output::{exit_status, print_help, say};
+use self::output::{Detail, exit_status, print_help, say};
 pub use self::stop::Stop;
 use crate::consistency::Verdict;
+use crate::input::InputError;
 use crate::units::plain;
 
 /// How a command ended when it could do its work.
@@ -70,11 +72,19 @@ impl VerdictFlags {
     name = "kfdesign",
     version,
     about,
-    after_help = "Exit status: 0 done and consistent; 1 done, but a stated check failed, or the verdict is inconclusive\n(see --allow-inconclusive); 2 could not do it. It is that of the work, whatever becomes of its output.\nUnits are never guessed: the log's header or --unit says them."
+    after_help = "Exit status: 0 done and consistent; 1 done, but a stated check failed, or the verdict is \
+                  inconclusive (see --allow-inconclusive); 2 could not do it. It is that of the work, whatever becomes \
+                  of its output.\nUnits are never guessed: the log's header or --unit says them."
 )]
 pub struct Cli {
     #[command(subcommand)]
     command: Command,
+    /// Every table and note, not only the answer
+    #[arg(short, long, global = true, display_order = 1000)]
+    verbose: bool,
+    /// The verdict alone
+    #[arg(short, long, global = true, display_order = 1000)]
+    quiet: bool,
 }
 
 #[derive(Debug, Subcommand)]
@@ -104,8 +114,15 @@ enum Command {
 /// Runs a command line, whose first word is the name of the program, and gives its exit status. Signals are the
 /// caller's: see [`Stop`].
 pub fn run(args: impl IntoIterator<Item = OsString>, stop: &Stop) -> u8 {
-    let cli = match Cli::try_parse_from(args) {
+    let args: Vec<OsString> = args.into_iter().collect();
+    let parsed = command().try_get_matches_from(&args).and_then(|found| Cli::from_arg_matches(&found));
+    let cli = match parsed {
         Ok(cli) => cli,
+        // the help, where nothing was asked for
+        Err(help) if help.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            print_help(&help);
+            return 2;
+        }
         Err(error) if error.use_stderr() => {
             say(&format!("kfdesign: {}", usage_error(&error)));
             return 2;
@@ -116,6 +133,15 @@ pub fn run(args: impl IntoIterator<Item = OsString>, stop: &Stop) -> u8 {
             return exit_status(0);
         }
     };
+    output::set_detail(match (cli.quiet, cli.verbose) {
+        (false, false) => Detail::Brief,
+        (false, true) => Detail::Full,
+        (true, false) => Detail::Quiet,
+        (true, true) => {
+            say("kfdesign: --quiet and --verbose contradict each other: give one of them");
+            return 2;
+        }
+    });
     find_threads();
     let command = || match cli.command {
         Command::Info(args) => info::run(&args),
@@ -144,10 +170,24 @@ pub fn run(args: impl IntoIterator<Item = OsString>, stop: &Stop) -> u8 {
         Ok(Status::Done) => 0,
         Ok(Status::CheckFailed) => 1,
         Err(error) => {
-            say(&format!("kfdesign: {}", in_one_line(&error)));
+            let missing = error.chain().find_map(|cause| cause.downcast_ref::<InputError>()).map(|e| &e.missing);
+            let example = missing.filter(|missing| !missing.is_empty()).map(|missing| with_options(&args, missing));
+            say(&format!("kfdesign: {}{}", in_one_line(&error), example.unwrap_or_default()));
             2
         }
     })
+}
+
+/// The command with options that were missing, to copy.
+fn with_options(args: &[OsString], missing: &[(&str, String)]) -> String {
+    let quoted = |word: &str| {
+        let plain = |c: char| c.is_alphanumeric() || "_./,:=+-^".contains(c);
+        if !word.is_empty() && word.chars().all(plain) { word.to_owned() } else { format!("'{word}'") }
+    };
+    let typed = args.iter().skip(1).map(|word| quoted(&word.to_string_lossy()));
+    let options = missing.iter().flat_map(|(option, value)| [format!("--{option}"), quoted(value)]);
+    let command: Vec<String> = std::iter::once("kfdesign".into()).chain(typed).chain(options).collect();
+    plain(&format!("; for example: {}", command.join(" "))).into_owned()
 }
 
 /// Where the machine gives no threads, for want of processes or of memory, this one does all the work. Rayon makes
@@ -172,11 +212,41 @@ fn in_one_line(error: &anyhow::Error) -> String {
 
 /// clap's message as one line: what was found and what is expected, without the usage block.
 fn usage_error(error: &clap::Error) -> String {
-    if error.kind() == clap::error::ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
-        return "no subcommand: kfdesign --help lists them".into();
-    }
     let text = error.render().to_string();
-    let message = text.split("\n\n").next().unwrap_or(&text);
-    let words: Vec<&str> = message.trim_start_matches("error: ").split_whitespace().collect();
-    format!("{} (kfdesign --help, or kfdesign COMMAND --help, lists what there is)", words.join(" "))
+    let mut parts = text.split("\n\n").map(|part| part.split_whitespace().collect::<Vec<_>>().join(" "));
+    let message = parts.next().unwrap_or_default();
+    // "tip: a similar argument exists: '--unit'"
+    let tip = parts.find_map(|part| part.strip_prefix("tip: ").map(String::from));
+    let help = || "kfdesign --help, or kfdesign COMMAND --help, lists what there is".to_string();
+    format!("{} ({})", message.trim_start_matches("error: "), tip.unwrap_or_else(help))
 }
+
+/// The command line, whose short help has the options that a person needs first.
+fn command() -> clap::Command {
+    let short = |(name, first): &(&str, &[&str]), command: clap::Command| {
+        let shown = |arg: &clap::Arg| arg.is_positional() || arg.get_long().is_some_and(|long| first.contains(&long));
+        command.mut_subcommand(name, |sub| {
+            let example = sub.get_after_help().map(ToString::to_string).unwrap_or_default();
+            sub.mut_args(|arg| if shown(&arg) { arg } else { arg.hide_short_help(true) })
+                .after_help(format!("{example}\nEvery option: kfdesign {name} --help"))
+                .after_long_help(example)
+        })
+    };
+    FIRST.iter().fold(Cli::command(), |command, entry| short(entry, command))
+}
+
+/// Options in the short help of a command: of the many there are, those without which little can be done.
+const FIRST: [(&str, &[&str]); 12] = [
+    ("allan", &["columns", "unit", "rate", "output", "plot"]),
+    ("identify", &["columns", "unit", "rate", "output", "report"]),
+    ("compare", &["columns", "unit", "rate", "parameters", "report"]),
+    ("inflate", &["columns", "unit", "rate", "from", "output"]),
+    ("simulate", &["output", "duration", "seed", "rate", "true-rate"]),
+    ("tune", &["output", "report", "plant", "objective", "log", "truth"]),
+    ("replay", &["columns", "unit", "rate", "output", "report", "allow-inconclusive"]),
+    ("montecarlo", &["runs", "duration", "truth", "output", "report", "junit"]),
+    ("merge", &["output", "report", "junit"]),
+    ("export", &["to", "output", "accelerometer", "rate", "inflate"]),
+    ("trim", &["speed", "altitude", "climb", "bank", "output", "report"]),
+    ("fly", &["output", "duration", "runs", "seed", "plot"]),
+];

@@ -1,17 +1,39 @@
 //! What every command writes to stdout and stderr: reports, documents, notes, progress.
 
 use std::borrow::Cow;
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::io::{ErrorKind, IsTerminal, Write};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
-use clap::CommandFactory;
+use anstream::stream::RawStream;
+use anstream::{AutoStream, ColorChoice};
+use anstyle::AnsiColor;
+use clap::{Arg, Command, CommandFactory};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
+use super::Status;
 use crate::export::atomic::in_words;
 use crate::numerics::progress::{self, Progress, Stopped};
-use crate::report::{Level, Report, terminal};
+use crate::report::{Report, terminal};
+
+/// Characters in a line where nobody says how wide the terminal is, and at most: what a person reads at a glance.
+const WIDTH: usize = 80;
+
+/// How much a person wants to see.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Detail {
+    /// The verdict.
+    Quiet,
+    /// What a person acts on.
+    #[default]
+    Brief,
+    /// Every table and note.
+    Full,
+}
+
+/// Of the command that runs.
+static DETAIL: Mutex<Detail> = Mutex::new(Detail::Brief);
 
 /// Why stdout did not take all that was meant for it.
 static LOST: OnceLock<String> = OnceLock::new();
@@ -24,13 +46,16 @@ pub fn print_json<T: Serialize>(value: &T) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What the library calls an option, `start`, as a shell knows it: --start.
+/// What the library calls an option, `start`, as a shell knows it: --start; `output` is -o.
 pub fn with_flags(text: &str) -> Cow<'_, str> {
-    static FLAGS: OnceLock<BTreeSet<String>> = OnceLock::new();
+    static FLAGS: OnceLock<BTreeMap<String, String>> = OnceLock::new();
+    let shown = |argument: &Arg| {
+        let long = argument.get_long()?;
+        Some((long.to_string(), argument.get_short().map_or(format!("--{long}"), |short| format!("-{short}"))))
+    };
     let all = || {
         let command = super::Cli::command();
-        let longs = command.get_subcommands().flat_map(|command| command.get_arguments()).filter_map(|a| a.get_long());
-        longs.map(String::from).collect()
+        command.get_subcommands().flat_map(Command::get_arguments).filter_map(shown).collect()
     };
     if !text.contains('`') {
         return Cow::Borrowed(text);
@@ -42,8 +67,8 @@ pub fn with_flags(text: &str) -> Cow<'_, str> {
     let mut opened = true;
     for part in parts {
         let flag = part.replace('_', "-");
-        if opened && flags.contains(&flag) {
-            out += &format!("--{flag}");
+        if let Some(flag) = flags.get(&flag).filter(|_| opened) {
+            out += flag;
             opened = false;
         } else if opened {
             out += &format!("`{part}");
@@ -67,15 +92,70 @@ pub fn print_text(text: &str) {
     }
 }
 
-/// A report for a person: as wide as the terminal, with every column and whole lines where stdout is none.
-pub fn print_report(report: &Report<'_>) {
+/// Who asks for less or more.
+pub fn set_detail(detail: Detail) {
+    *DETAIL.lock().unwrap_or_else(PoisonError::into_inner) = detail;
+}
+
+fn detail() -> Detail {
+    *DETAIL.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A report for a person: the answer, or every table, as wide as the terminal, and with whole lines where stdout is
+/// none. `status`: of the work.
+pub fn print_report(report: &Report<'_>, status: Status) {
     let width = terminal_size::terminal_size_of(std::io::stdout()).map(|(width, _)| usize::from(width.0));
-    print_text(&with_flags(&terminal::text(report, Level::Full, width)));
+    let ending = if status == Status::CheckFailed { " (exit 1)" } else { "" };
+    let text = match detail() {
+        Detail::Quiet => terminal::first_line(report, ending).map_or_else(String::new, |line| line + "\n"),
+        Detail::Brief => terminal::brief(report, ending, width.map_or(WIDTH, |width| width.min(WIDTH))),
+        Detail::Full => terminal::full(report, width),
+    };
+    let text = with_flags(&text);
+    print_text(&if colours(&std::io::stdout()) { painted(&text) } else { text.into_owned() });
+}
+
+/// Whether the stream takes colours: a terminal, unless NO_COLOR or CLICOLOR=0 say otherwise.
+fn colours(stream: &impl RawStream) -> bool {
+    AutoStream::choice(stream) != ColorChoice::Never
+}
+
+/// Verdicts and warnings in colour.
+fn painted(text: &str) -> String {
+    let paint = |word: &str, colour: AnsiColor| {
+        let style = colour.on_default().bold();
+        format!("{style}{word}{style:#}")
+    };
+    let line = |line: &str| {
+        let first = line.split([' ', ':']).next().unwrap_or_default();
+        let colour = match first {
+            "CONSISTENT" | "consistent" => Some(AnsiColor::Green),
+            "INCONSISTENT" | "inconsistent" | "CHECK" => Some(AnsiColor::Red),
+            "INCONCLUSIVE" | "inconclusive" | "warning" => Some(AnsiColor::Yellow),
+            _ => None,
+        };
+        let line = match colour {
+            Some(colour) => line.replacen(first, &paint(first, colour), 1),
+            None => line.to_owned(),
+        };
+        line.replace(" FAIL", &format!(" {}", paint("FAIL", AnsiColor::Red)))
+    };
+    text.split('\n').map(line).collect::<Vec<_>>().join("\n")
 }
 
 /// A line on stderr. Who does not listen misses it.
 pub fn say(line: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{}", with_flags(line));
+}
+
+/// The same, in lines of a width where a person wants to see little, in colour on a terminal.
+fn warn(line: &str) {
+    let text = format!("  warning: {}", with_flags(line));
+    let lines = if detail() == Detail::Full { vec![text] } else { terminal::broken(&text, WIDTH) };
+    for line in lines {
+        let line = if colours(&std::io::stderr()) { painted(line.trim_start()) } else { line };
+        let _ = writeln!(std::io::stderr().lock(), "{line}");
+    }
 }
 
 /// The help of clap, coloured for a terminal.
@@ -133,8 +213,17 @@ impl Progress for Terminal {
     }
 
     fn note(&self, line: &str) {
-        self.end();
-        say(line);
+        if detail() == Detail::Full {
+            self.end();
+            say(line);
+        }
+    }
+
+    fn warning(&self, line: &str) {
+        if detail() != Detail::Quiet {
+            self.end();
+            warn(line);
+        }
     }
 }
 
@@ -157,6 +246,7 @@ mod tests {
         assert_eq!(with_flags("cut it with `start`/`end`"), "cut it with --start/--end");
         assert_eq!(with_flags("give `allow_zero_walk`"), "give --allow-zero-walk");
         assert_eq!(with_flags("`rate`"), "--rate");
+        assert_eq!(with_flags("needs `output` FILE"), "needs -o FILE");
         assert_eq!(with_flags("a `word`, a ` and `rate` HZ"), "a `word`, a ` and --rate HZ");
         assert_eq!(with_flags("no marks"), "no marks");
     }

@@ -29,13 +29,18 @@ pub struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
-    files::check(&[("-o", &args.output, Kind::Json)], &[&args.request.params])?;
+    let outputs = [("-o", &args.output, Kind::Json)];
+    files::check(&outputs, &[&args.request.params])?;
     let plan = plan(&args.request)?;
     files::write_json(args.output.as_deref(), &plan)?;
+    let possible = plan.axes.iter().all(|axis| axis.duration_s.is_some());
+    let status = if possible { Status::Done } else { Status::CheckFailed };
     if args.json {
         print_json(&plan)?;
     } else {
-        print_report(&view::plan::plan(&plan));
+        let mut report = view::plan::plan(&plan);
+        report.written = files::written(&outputs);
+        print_report(&report, status);
     }
-    Ok(if plan.axes.iter().all(|axis| axis.duration_s.is_some()) { Status::Done } else { Status::CheckFailed })
+    Ok(status)
 }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use super::files::{self, Kind};
 use super::output::{print_json, print_report};
 use super::{Status, VerdictFlags};
+use crate::consistency::Verdict;
 use crate::filter::AttitudeDesign;
 use crate::ops::replay::attitude::linear_only;
 use crate::ops::replay::{Done, Request, run as replay};
@@ -48,23 +49,30 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     }
     match replay(request)? {
         Done::Linear(result, unit) => {
-            let report = view::replay::replay(&result, &request.filter.display().to_string(), unit.as_ref());
+            let mut report = view::replay::replay(&result, &request.filter.display().to_string(), unit.as_ref());
             files::write_plot(args.plot.as_deref(), "Replay", &report)?;
             files::write_page(args.report.as_deref(), &report)?;
+            let status = args.judging.status([result.verdict]);
             if args.json {
                 print_json(&result)?;
             } else {
-                print_report(&report);
+                report.written = files::written(&outputs);
+                let honest = result.verdict == Verdict::Consistent;
+                report.next = honest.then(|| format!("kfdesign montecarlo {}", request.filter.display()));
+                print_report(&report, status);
             }
-            Ok(args.judging.status([result.verdict]))
+            Ok(status)
         }
         Done::Attitude(result, design) => {
+            let status = args.judging.status([result.verdict]);
             if args.json {
                 print_json(&result)?;
             } else {
-                print_report(&view::replay::attitude(&result, &design));
+                let mut report = view::replay::attitude(&result, &design);
+                report.written = files::written(&outputs);
+                print_report(&report, status);
             }
-            Ok(args.judging.status([result.verdict]))
+            Ok(status)
         }
     }
 }

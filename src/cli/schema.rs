@@ -14,7 +14,11 @@ use crate::filter::{AttitudeDesign, FilterDesign};
 use crate::identify::log_plan::LogPlan;
 use crate::input::inspect::Inventory;
 use crate::montecarlo;
-use crate::ops::{allan, compare, identify, inflate, plan, replay, simulate, tune};
+use crate::ops::montecarlo as runs;
+use crate::ops::{
+    airplane, allan, compare, datasheet, export, fly, identify, import, inflate, info, plan, replay, simulate, trim,
+    tune,
+};
 use crate::params::Params;
 use crate::replay::ReplayResult;
 use crate::replay::attitude::AttitudeReplay;
@@ -61,7 +65,7 @@ enum Document {
     Tune,
     /// What `tune --plant attitude --json` prints
     TuneAttitude,
-    /// What `tune --compare --json` prints
+    /// What `tune --rank --json` prints
     Ranking,
     /// What `replay --json` prints
     Replay,
@@ -89,6 +93,24 @@ enum Document {
     TuneRequest,
     /// What `replay` is asked for
     ReplayRequest,
+    /// What `info` is asked for
+    InfoRequest,
+    /// What `airplane` is asked for
+    AirplaneRequest,
+    /// What `trim` is asked for
+    TrimRequest,
+    /// What `fly` is asked for
+    FlyRequest,
+    /// What `montecarlo` is asked for
+    MontecarloRequest,
+    /// What `merge` is asked for
+    MergeRequest,
+    /// What `export` is asked for
+    ExportRequest,
+    /// What `import` is asked for
+    ImportRequest,
+    /// What `datasheet` is asked for
+    DatasheetRequest,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
@@ -122,6 +144,15 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         Document::SimulateRequest => asked::<simulate::Request>(),
         Document::TuneRequest => asked::<tune::Request>(),
         Document::ReplayRequest => asked::<replay::Request>(),
+        Document::InfoRequest => asked::<info::Request>(),
+        Document::AirplaneRequest => asked::<airplane::Request>(),
+        Document::TrimRequest => asked::<trim::Request>(),
+        Document::FlyRequest => asked::<fly::Request>(),
+        Document::MontecarloRequest => asked::<runs::Request>(),
+        Document::MergeRequest => asked::<runs::merge::Request>(),
+        Document::ExportRequest => asked::<export::Request>(),
+        Document::ImportRequest => asked::<import::Request>(),
+        Document::DatasheetRequest => asked::<datasheet::Request>(),
     })?;
     Ok(Status::Done)
 }

@@ -9,7 +9,8 @@ use crate::view;
 /// A sensor stream with truth columns from params.json
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: kfdesign simulate data/params.json -o log.npy --duration 2h --seed 1\n\
-    Columns: time (s); gyro_NAME or accel_NAME per axis; truth_NAME_rate, truth_NAME_bias (constant), truth_NAME_drift. With a plant: AID_NAME \
+    Columns: time (s); gyro_NAME or accel_NAME per axis; truth_NAME_rate, truth_NAME_bias (constant), \
+    truth_NAME_drift. With a plant: AID_NAME \
     for every aid (empty where it measures nothing), accelerometer_NAME, truth_NAME_angle (or tilt).")]
 pub struct Args {
     #[command(flatten)]
@@ -25,7 +26,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if args.json {
         print_json(&summary)?;
     } else {
-        print_report(&view::simulate::simulate(&summary));
+        print_report(&view::simulate::simulate(&summary), Status::Done);
     }
     Ok(Status::Done)
 }

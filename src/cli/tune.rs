@@ -38,13 +38,13 @@ pub struct Args {
     #[command(flatten)]
     judging: VerdictFlags,
     /// Rank designs (filter.json, or params.json as identified) on logs instead
-    #[arg(long, num_args = 1.., value_name = "DESIGN|LOG")]
-    compare: Vec<PathBuf>,
+    #[arg(long, alias = "compare", num_args = 1.., value_name = "DESIGN|LOG")]
+    rank: Vec<PathBuf>,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
-    if let Some(path) = args.request.params.as_ref().filter(|_| !args.compare.is_empty()) {
-        bail!("--compare ranks designs and makes none: leave out {}", path.display());
+    if let Some(path) = args.request.params.as_ref().filter(|_| !args.rank.is_empty()) {
+        bail!("--rank ranks designs and makes none: leave out {}", path.display());
     }
     if args.request.params.is_none() {
         return rank(args);
@@ -53,12 +53,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         [("-o", &args.output, Kind::Json), ("--report", &args.report, Kind::Html), ("--plot", &args.plot, Kind::Svg)];
     files::check(&outputs, &args.request.inputs())?;
     match tune(&args.request)? {
-        Done::Linear(done) => linear(args, &done),
+        Done::Linear(done) => linear(args, &done, &outputs),
         Done::Attitude(tuned) => of_attitude(args, &tuned),
     }
 }
 
-fn linear(args: &Args, done: &Linear) -> anyhow::Result<Status> {
+fn linear(args: &Args, done: &Linear, outputs: &[files::Output<'_>]) -> anyhow::Result<Status> {
     if let (Some(output), true) = (&args.output, done.verified) {
         atomic::write(output, done.tuned.design.to_json().as_bytes())?;
     }
@@ -66,14 +66,21 @@ fn linear(args: &Args, done: &Linear) -> anyhow::Result<Status> {
     let mut report = view::tune::tune(&shown);
     files::write_plot(args.plot.as_deref(), "Tuned filter", &report)?;
     files::write_page(args.report.as_deref(), &report)?;
+    let replays = done.replays.iter().map(|replay| replay.verdict);
+    let status = if done.verified { args.judging.status(replays) } else { Status::CheckFailed };
     if args.json {
         print_json(&done.document()?)?;
     } else {
         report.written.extend(args.output.as_deref().map(|output| written(output, done.verified)));
-        print_report(&report);
+        report.written.extend(files::written(&outputs[1..]));
+        report.next = args
+            .output
+            .as_deref()
+            .filter(|_| done.verified)
+            .map(|output| format!("kfdesign replay {} LOG", output.display()));
+        print_report(&report, status);
     }
-    let replays = done.replays.iter().map(|replay| replay.verdict);
-    Ok(if done.verified { args.judging.status(replays) } else { Status::CheckFailed })
+    Ok(status)
 }
 
 fn of_attitude(args: &Args, tuned: &TunedAttitude) -> anyhow::Result<Status> {
@@ -91,15 +98,15 @@ fn of_attitude(args: &Args, tuned: &TunedAttitude) -> anyhow::Result<Status> {
         let name = args.request.params.as_deref().map(|path| path.display().to_string()).unwrap_or_default();
         let mut report = view::tune::attitude(&name, tuned);
         report.written.extend(args.output.as_ref().map(|output| format!("{} written", output.display())));
-        print_report(&report);
+        print_report(&report, Status::Done);
     }
     Ok(Status::Done)
 }
 
 fn rank(args: &Args) -> anyhow::Result<Status> {
-    files::check(&[], &args.compare.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
+    files::check(&[], &args.rank.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
     let request = compare::Request {
-        files: args.compare.clone(),
+        files: args.rank.clone(),
         held_out: args.request.choosing.held_out,
         flicker_horizon: args.request.flicker_horizon,
         plant: args.request.plant.clone(),
@@ -109,7 +116,7 @@ fn rank(args: &Args) -> anyhow::Result<Status> {
     if args.json {
         print_json(&ranking)?;
     } else {
-        print_report(&view::tune::ranking(&ranking, &first));
+        print_report(&view::tune::ranking(&ranking, &first), Status::Done);
     }
     Ok(Status::Done)
 }

@@ -92,7 +92,8 @@ pub(super) fn allan_curve(
     };
     let meaning = if statistic.abs() <= bound {
         format!(
-            "the Allan curve stays in the model's envelope; farthest at {}, {} times the model's ({:+.2} standard deviations)",
+            "the Allan curve stays in the model's envelope; farthest at {}, {} times the model's ({:+.2} standard \
+             deviations)",
             time(at),
             digits(ratio(at)),
             statistic

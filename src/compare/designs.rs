@@ -20,12 +20,13 @@ pub enum RankError {
     #[error(transparent)]
     Replay(#[from] ReplayError),
     #[error(
-        "{design} measures {found}, {first} measures {expected}; only designs that measure the same can be ranked by likelihood"
+        "{design} measures {found}, {first} measures {expected}; only designs that measure the same can be ranked by \
+         likelihood"
     )]
     Measurements { design: String, found: String, first: String, expected: String },
 }
 
-/// What `tune --compare` prints.
+/// What `tune --rank` prints.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Ranking {
     /// "kfdesign-ranking/1".

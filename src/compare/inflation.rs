@@ -125,7 +125,8 @@ pub fn inflation(params: &Params, log: &Log, from_hz: f64) -> Result<Inflation, 
         sample_rate: log.sample_rate_hz,
         from_hz,
         valid_for: format!(
-            "noise above {} Hz sampled at {} Hz, for the vehicle, mounting and engine speed of this log; slower noise and drift are not \
+            "noise above {} Hz sampled at {} Hz, for the vehicle, mounting and engine speed of this log; slower noise \
+             and drift are not \
              measured, since motion hides them; motion above {} Hz, if there is any, counts as noise",
             digits(from_hz),
             digits(log.sample_rate_hz),
@@ -165,7 +166,8 @@ fn inflation_of(
     let count = ratios.values.len();
     if count < FEWEST {
         return Err(failed(format!(
-            "{count} spectral coefficients above {} Hz are too few: at least {FEWEST} are needed; use a longer log or a lower `from`",
+            "{count} spectral coefficients above {} Hz are too few: at least {FEWEST} are needed; use a longer log or \
+             a lower `from`",
             digits(from_hz)
         )));
     }
@@ -181,14 +183,16 @@ fn inflation_of(
     let mut notes: Vec<String> = other_rate(params.sample_rate_hz, rate_hz, &model).into_iter().collect();
     if factor > LINES_MATTER * robust_factor {
         notes.push(format!(
-            "{} % of the power is in lines or a part of the band: as white noise it is overstated elsewhere; without, the factor is {}",
+            "{} % of the power is in lines or a part of the band: as white noise it is overstated elsewhere; without, \
+             the factor is {}",
             digits(100.0 * (1.0 - (robust_factor / factor).powi(2))),
             digits(robust_factor)
         ));
     }
     if let Some(top) = top_hz {
         notes.push(format!(
-            "what is above {} Hz, where the band limit lets through less than half, is left out: the converter's own noise has a part there",
+            "what is above {} Hz, where the band limit lets through less than half, is left out: the converter's own \
+             noise has a part there",
             digits(top)
         ));
     }
@@ -334,7 +338,8 @@ fn not_wideband(model: &NoiseModel, dt: f64, ratios: &Ratios) -> Option<String> 
     let other = places.map(|f| 1.0 - wideband.psd(f, dt) / model.psd(f, dt)).sum::<f64>() / SEEN as f64;
     (other > 0.1).then(|| {
         format!(
-            "{} % of the model's power in the band is not wideband noise (lines, quantisation, fast drift): the factor is that of all of it",
+            "{} % of the model's power in the band is not wideband noise (lines, quantisation, fast drift): the factor \
+             is that of all of it",
             digits(100.0 * other)
         )
     })

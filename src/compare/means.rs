@@ -93,7 +93,8 @@ pub(super) fn means(
     };
     let real = mean(rate);
     let sentence = format!(
-        "mean of the log {}, of a simulated one {}: this proves nothing, since the constant bias is set by hand and {spread}; two logs of \
+        "mean of the log {}, of a simulated one {}: this proves nothing, since the constant bias is set by hand and \
+         {spread}; two logs of \
          the same sensor differ by that much anyway",
         shown(real),
         shown(simulated)

@@ -71,11 +71,13 @@ pub struct Log {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CompareError {
     #[error(
-        "the log is in {log} but the parameters are for {params}: choose the columns with `columns` or `sensor`, or give the right parameters"
+        "the log is in {log} but the parameters are for {params}: choose the columns with `columns` or `sensor`, or \
+         give the right parameters"
     )]
     Quantity { log: &'static str, params: &'static str },
     #[error(
-        "cannot tell which axis is which: the log has {log}, the parameters have {params}; choose with `columns`, in the order of the parameters' axes"
+        "cannot tell which axis is which: the log has {log}, the parameters have {params}; choose with `columns`, in \
+         the order of the parameters' axes"
     )]
     Axes { log: String, params: String },
     #[error("axis '{axis}': {message}")]
@@ -208,7 +210,8 @@ fn usable(axis: &AxisParams, log: &LogAxis, dt: f64) -> Result<(), String> {
     }
     if rate.iter().all(|x| *x == rate[0]) {
         return Err(format!(
-            "constant ({} in SI units, {} samples): a sensor that says the same all the time has no noise to compare; check the column",
+            "constant ({} in SI units, {} samples): a sensor that says the same all the time has no noise to compare; \
+             check the column",
             digits(rate[0]),
             rate.len()
         ));
@@ -271,7 +274,8 @@ fn of_neighbours(model: &NoiseModel, log: &LogAxis) -> Option<String> {
         |kind: Kind| matches!(kind, Kind::MovingAverage | Kind::BandLimit | Kind::Oscillation | Kind::Quantization);
     (log.filled > 0 && model.terms.iter().any(|term| tied(term.kind()))).then(|| {
         format!(
-            "{} % of the samples are filled in and are not tied to their neighbours as averages, lines and quantisation are: differences where the model has little power may come from that; \
+            "{} % of the samples are filled in and are not tied to their neighbours as averages, lines and \
+             quantisation are: differences where the model has little power may come from that; \
              nis and whiteness are of the samples that are there",
             digits(100.0 * log.filled as f64 / log.rate.len() as f64)
         )
@@ -287,7 +291,8 @@ fn other_rate(params_hz: f64, log_hz: f64, model: &NoiseModel) -> Option<String>
     let consequence = match model.of_samples() {
         None => "every term is continuous and is sampled at the log's rate".into(),
         Some(counted) => format!(
-            "{counted} belongs to the samples and is another process at another rate: differences at high frequencies may come from that"
+            "{counted} belongs to the samples and is another process at another rate: differences at high frequencies \
+             may come from that"
         ),
     };
     Some(format!("the parameters are for {} Hz, the log has {} Hz: {consequence}", digits(params_hz), digits(log_hz)))
@@ -308,7 +313,8 @@ fn unseen_drift(model: &NoiseModel, samples: usize, dt: f64) -> Option<String> {
         |m| format!("a log of about {} s would show it", digits(3.0 * m as f64 * dt)),
     );
     Some(format!(
-        "in {} s the model's drift is less than half of its Allan variance at all averaging times, so it is not tested; {needed}",
+        "in {} s the model's drift is less than half of its Allan variance at all averaging times, so it is not \
+         tested; {needed}",
         digits(samples as f64 * dt)
     ))
 }

@@ -215,13 +215,15 @@ impl BlockResult {
         let seconds = self.length as f64 * dt;
         let meaning = if self.ratio > self.upper {
             format!(
-                "averaged over {} s the innovations have {} times the predicted power: the filter is optimistic about slow drift (it expects less than there is)",
+                "averaged over {} s the innovations have {} times the predicted power: the filter is optimistic about \
+                 slow drift (it expects less than there is)",
                 digits(seconds),
                 digits(self.ratio)
             )
         } else if self.ratio < self.lower {
             format!(
-                "averaged over {} s the innovations have {} times the predicted power: the filter is pessimistic about slow drift (it expects more than there is)",
+                "averaged over {} s the innovations have {} times the predicted power: the filter is pessimistic about \
+                 slow drift (it expects more than there is)",
                 digits(seconds),
                 digits(self.ratio)
             )

@@ -124,10 +124,12 @@ impl MeanTest {
         let ratio = (self.mean / self.expected).sqrt();
         let meaning = match self.tendency() {
             "optimistic" => format!(
-                "the filter is optimistic: its errors are {ratio:.3} times as large as its covariance says (P, Q or R too small, or states missing)"
+                "the filter is optimistic: its errors are {ratio:.3} times as large as its covariance says (P, Q or R \
+                 too small, or states missing)"
             ),
             "pessimistic" => format!(
-                "the filter is pessimistic: its errors are only {ratio:.3} times as large as its covariance says (P, Q or R too large)"
+                "the filter is pessimistic: its errors are only {ratio:.3} times as large as its covariance says (P, Q \
+                 or R too large)"
             ),
             _ => "the estimation errors are as large as the covariance says".to_string(),
         };
@@ -142,10 +144,12 @@ impl MeanTest {
         let sigma = 100.0 * ((1.0 + deviation).max(0.0).sqrt() - 1.0).abs();
         let meaning = match self.tendency() {
             "optimistic" => format!(
-                "the filter is optimistic: innovations are {sigma:.2} % larger than sqrt(S) says; mostly the white noise (R) is too small"
+                "the filter is optimistic: innovations are {sigma:.2} % larger than sqrt(S) says; mostly the white \
+                 noise (R) is too small"
             ),
             "pessimistic" => format!(
-                "the filter is pessimistic: innovations are {sigma:.2} % smaller than sqrt(S) says; mostly the white noise (R) is too large"
+                "the filter is pessimistic: innovations are {sigma:.2} % smaller than sqrt(S) says; mostly the white \
+                 noise (R) is too large"
             ),
             _ => "the innovations are as large as the filter says".to_string(),
         };

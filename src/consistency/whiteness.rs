@@ -236,7 +236,8 @@ impl Whiteness {
         let (share, interval) = self.predictable_share(alpha);
         let all = if self.ljung_box > self.ljung_box_upper {
             format!(
-                "lags 1 to {} together are correlated: a better model could predict about {} % of the innovation variance",
+                "lags 1 to {} together are correlated: a better model could predict about {} % of the innovation \
+                 variance",
                 self.lags,
                 digits(100.0 * share)
             )
@@ -352,11 +353,13 @@ impl CumulativePeriodogram {
             format!("the innovations are white at periods above {} s", digits(2.0 * interval_s))
         } else if self.distance > 0.0 {
             format!(
-                "too much innovation power at periods above {period} s: the filter is optimistic about slow drift (it expects less than there is)"
+                "too much innovation power at periods above {period} s: the filter is optimistic about slow drift (it \
+                 expects less than there is)"
             )
         } else {
             format!(
-                "too little innovation power at periods above {period} s: the filter is pessimistic about slow drift (it expects more than there is)"
+                "too little innovation power at periods above {period} s: the filter is pessimistic about slow drift \
+                 (it expects more than there is)"
             )
         };
         let size = self.distance.abs();

@@ -219,7 +219,8 @@ fn steady(object: &Object<'_>, axis: &Place<'_>, model: &LinearModel) -> Result<
         let size = computed.gain.amax().max(documented.gain.amax());
         if difference > GAIN_TOLERANCE * size {
             return Err(place.error(format!(
-                "does not belong to F, H, Q, R: its gain is {} away from theirs; leave steady_state out and it is computed",
+                "does not belong to F, H, Q, R: its gain is {} away from theirs; leave steady_state out and it is \
+                 computed",
                 digits(difference)
             )));
         }

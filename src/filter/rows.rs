@@ -121,7 +121,8 @@ mod tests {
     #[test]
     fn rows_stay_on_a_line_and_numbers_read_back() {
         let value = serde_json::json!({
-            "F": [[1.0, 0.1], [0.0, 1e-300]], "G": [[], []], "a": [{"n": null, "t": [true, "x, \"y\""]}], "e": [], "o": {"u": -3},
+            "F": [[1.0, 0.1], [0.0, 1e-300]], "G": [[], []], "a": [{"n": null, "t": [true, "x, \
+                                                    \"y\""]}], "e": [], "o": {"u": -3},
         });
         let expected = r#"{
   "F": [

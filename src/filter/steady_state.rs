@@ -41,7 +41,8 @@ pub struct SteadyState {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SteadyStateError {
     #[error(
-        "the measurements, taken every {every} samples, fall together only after more than a million samples; choose rates that divide each other"
+        "the measurements, taken every {every} samples, fall together only after more than a million samples; choose \
+         rates that divide each other"
     )]
     Period { every: String },
     #[error("there is no steady state: state '{state}' grows without noise (pole {modulus:.6})")]

@@ -57,7 +57,8 @@ pub(super) fn identify(
     };
     let fit = fit.ok_or_else(|| match &forced {
         Some(shape) => failed(format!(
-            "{} samples give {} points of the Allan curve: too few for {} parameters ({}); use a longer log or a smaller `model`",
+            "{} samples give {} points of the Allan curve: too few for {} parameters ({}); use a longer log or a \
+             smaller `model`",
             rate.len(),
             points.len(),
             shape.parameters(),
@@ -291,7 +292,8 @@ impl Words<'_> {
         NotIdentified {
             term: other.name().into(),
             reason: format!(
-                "{} in place of {} explains the curve about as well (score {} against {}{at}): the log does not tell them apart",
+                "{} in place of {} explains the curve about as well (score {} against {}{at}): the log does not tell \
+                 them apart",
                 other.short_name(),
                 own.short_name(),
                 digits(score(fit)),
@@ -336,15 +338,18 @@ impl Words<'_> {
                 "vibration, aliasing or quantisation show"
             };
             warnings.push(format!(
-                "averaging times below {} s left out: {why}, and N of shorter times would feel it; the deviation of single samples is {:+.0} % off the model, so \
-                 neighbouring innovations of a filter at this rate will not be white (`method` likelihood looks for filters and lines)",
+                "averaging times below {} s left out: {why}, and N of shorter times would feel it; the deviation of \
+                 single samples is {:+.0} % off the model, so \
+                 neighbouring innovations of a filter at this rate will not be white (`method` likelihood looks for \
+                 filters and lines)",
                 digits(first),
                 percent
             ));
         }
         if fit.p_value() < FIT_LEVEL {
             warnings.push(format!(
-                "the model does not explain the curve (chi-square {} on {} degrees of freedom, p = {}): intervals widened by {}",
+                "the model does not explain the curve (chi-square {} on {} degrees of freedom, p = {}): intervals \
+                 widened by {}",
                 digits(fit.chi_square),
                 fit.dof(),
                 digits(fit.p_value()),
@@ -364,7 +369,8 @@ impl Words<'_> {
         let sentence = |j: usize| {
             let hours = |ratio: f64| digits(self.length_for(fit, j, ratio).unwrap_or(f64::NAN) / 3600.0);
             format!(
-                "correlation time known within a factor of {} (95 %); a factor of 1.5 takes a log of {} h, 1.2 takes {} h",
+                "correlation time known within a factor of {} (95 %); a factor of 1.5 takes a log of {} h, 1.2 takes \
+                 {} h",
                 digits((NORMAL_95 * log_sigma(fit, j)).exp()),
                 hours(1.5 * 1.5),
                 hours(1.2 * 1.2)

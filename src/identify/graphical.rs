@@ -85,7 +85,8 @@ pub(super) fn identify(name: &str, rate: &[f64], dt: f64, display: &Unit) -> Res
         _ => not_identified.push(NotIdentified {
             term: "gauss_markov".into(),
             reason: format!(
-                "no maximum after the minimum of the Allan curve up to a ninth of the log: the recipe has nothing to read the correlation time from \
+                "no maximum after the minimum of the Allan curve up to a ninth of the log: the recipe has nothing to \
+                 read the correlation time from \
                  (a maximum exists only if N/(σ√Tc) < {LARGEST_RATIO}, and shows only in a log of many Tc)"
             ),
             needed_log_s: None,
@@ -96,7 +97,8 @@ pub(super) fn identify(name: &str, rate: &[f64], dt: f64, display: &Unit) -> Res
     curve.refine(&model);
     let steps = steps(&reading, &curve, &model, dt, display);
     let mut warnings = vec![
-        "the graphical recipe gives no intervals and is biased on its own model (see the cost of each step); `method` allan is \
+        "the graphical recipe gives no intervals and is biased on its own model (see the cost of each step); `method` \
+         allan is \
          nearly unbiased on the same log"
             .to_string(),
     ];
@@ -272,7 +274,8 @@ fn steps(reading: &Reading, curve: &AllanCurve, model: &NoiseModel, dt: f64, dis
         },
         value: reading.minimum.as_ref().map(|m| rate.from_si(bias_instability(m.deviation))),
         unit: rate.to_string(),
-        cost: "in white noise + Gauss-Markov the minimum is where the two slopes cross, not a flicker floor: B is no parameter of \
+        cost: "in white noise + Gauss-Markov the minimum is where the two slopes cross, not a flicker floor: B is no \
+               parameter of \
                that model and is not written to the parameters"
             .into(),
     };
@@ -287,7 +290,8 @@ fn peak_cost(reading: &Reading, curve: &AllanCurve, model: &NoiseModel, rate: &U
     let (lower, upper) = edf::interval(peak.deviation, edf);
     // the deviation stays within 1 % of its maximum for tau/Tc in [1.474, 2.421]
     let mut cost = format!(
-        "the maximum is flat (within 1 % from {} to {} s) and has {} degrees of freedom (95 %: {} to {} {rate}): Tc scatters by \
+        "the maximum is flat (within 1 % from {} to {} s) and has {} degrees of freedom (95 %: {} to {} {rate}): Tc \
+         scatters by \
          far more than the curve is wide",
         digits(peak.tau_s * 1.474 / 1.8926),
         digits(peak.tau_s * 2.421 / 1.8926),

@@ -359,7 +359,8 @@ fn usable(name: &str, rate: &[f64]) -> Result<(), IdentifyError> {
     }
     if rate.iter().all(|x| *x == rate[0]) {
         return failed(format!(
-            "constant ({} in SI units, {} samples): a sensor that says the same all the time has no noise to identify; check the column, or name the others with `columns`",
+            "constant ({} in SI units, {} samples): a sensor that says the same all the time has no noise to identify; \
+             check the column, or name the others with `columns`",
             digits(rate[0]),
             rate.len()
         ));

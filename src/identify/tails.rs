@@ -54,7 +54,7 @@ const CELLS: usize = 1024;
 pub struct Tails {
     /// Of the log whitened by its model; 0 where it is that of normal noise within chance.
     pub excess_kurtosis: f64,
-    /// With `--robust`, where what is not left out has tails.
+    /// With `--without-outliers`, where what is not left out has tails.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub student: Option<Student>,
 }
@@ -374,7 +374,8 @@ impl Student {
             ""
         };
         format!(
-            "the noise has tails, those of Student's t with {} degrees of freedom: N holds their variance, {} of what is within the limits of outliers{end}",
+            "the noise has tails, those of Student's t with {} degrees of freedom: N holds their variance, {} of what \
+             is within the limits of outliers{end}",
             digits(self.degrees_of_freedom),
             digits(self.factor)
         )

@@ -71,7 +71,11 @@ pub fn parameters(sheet: &Datasheet) -> Result<Imported, String> {
         terms.push(TermEntry::RateRandomWalk { density: density.clone() });
     }
     if terms.len() == 1 {
-        said.warnings.push("no drift: a filter of these numbers averages for ever; a bias instability or a rate random walk would bound it".into());
+        said.warnings.push(
+            "no drift: a filter of these numbers averages for ever; a bias instability or a rate random \
+                            walk would bound it"
+                .into(),
+        );
     }
     if let Some(bias) = &sheet.turn_on_bias {
         said.rule(format!("turn-on bias {} is one standard deviation; of a limit, give a third", shown(bias)));
@@ -149,14 +153,17 @@ fn white(sheet: &Datasheet, said: &mut Said) -> Result<Measured, String> {
         }
         (Some(density), None) if walk.is_none() => {
             return Err(format!(
-                "the noise density {} may be one-sided (deviation in a band = density sqrt(band), as spectrum analysers show it) or two-sided (as an angle random walk \
-                 is): a factor of sqrt(2) in N. Give `sided` one or `sided` two, or the angle random walk beside it, which tells",
+                "the noise density {} may be one-sided (deviation in a band = density sqrt(band), as spectrum \
+                 analysers show it) or two-sided (as an angle random walk \
+                 is): a factor of sqrt(2) in N. Give `sided` one or `sided` two, or the angle random walk beside it, \
+                 which tells",
                 shown(density)
             ));
         }
         (Some(density), None) => {
             said.warnings.push(format!(
-                "the noise density {} is neither the random walk nor sqrt(2) times it (ratio {}): the random walk is taken",
+                "the noise density {} is neither the random walk nor sqrt(2) times it (ratio {}): the random walk is \
+                 taken",
                 shown(density),
                 walk.map_or_else(String::new, |walk| digits(density.si() / walk.si()))
             ));
@@ -244,7 +251,8 @@ fn drift(sheet: &Datasheet, said: &mut Said) -> Result<Option<TermEntry>, String
         Some(time) => {
             let std_dev = times(given, factor / GAUSS_MARKOV_PEAK);
             said.rule(format!(
-                "{is}: with Tc = {} the Gauss-Markov process whose Allan deviation rises to that floor, sigma = floor/{GAUSS_MARKOV_PEAK:.4} = {}",
+                "{is}: with Tc = {} the Gauss-Markov process whose Allan deviation rises to that floor, sigma = \
+                 floor/{GAUSS_MARKOV_PEAK:.4} = {}",
                 shown(time),
                 shown(&std_dev)
             ));
@@ -261,14 +269,16 @@ fn bandwidth(sheet: &Datasheet, white: &TermEntry, said: &mut Said) {
     if band > half * (1.0 + ALIKE) {
         let folded = times(density, (band / half).sqrt());
         said.warnings.push(format!(
-            "the bandwidth of {shown_band} reaches beyond half the sample rate of {} Hz: where the sensor does not average before it gives a sample, the noise above \
+            "the bandwidth of {shown_band} reaches beyond half the sample rate of {} Hz: where the sensor does not \
+             average before it gives a sample, the noise above \
              folds into the log, which then shows N = {}",
             digits(sheet.sample_rate_hz),
             shown(&folded)
         ));
     } else if band < half * (1.0 - ALIKE) {
         said.warnings.push(format!(
-            "the bandwidth of {shown_band} is below half the sample rate of {} Hz: neighbouring samples of a log are alike, N holds for the low frequencies",
+            "the bandwidth of {shown_band} is below half the sample rate of {} Hz: neighbouring samples of a log are \
+             alike, N holds for the low frequencies",
             digits(sheet.sample_rate_hz)
         ));
     }

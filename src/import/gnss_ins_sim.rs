@@ -67,7 +67,8 @@ pub(super) fn parse(text: &str, rate_hz: Option<f64>) -> Result<Imported, Proble
             );
             if times.is_infinite() && of(&drift).is_some_and(|sigma| sigma > 0.0) {
                 warnings.push(format!(
-                    "{name}: without a finite {} the program makes white noise of the deviation {}, no drift: it is read as that, at {} Hz",
+                    "{name}: without a finite {} the program makes white noise of the deviation {}, no drift: it is \
+                     read as that, at {} Hz",
                     names.time,
                     names.drift,
                     digits(sample_rate_hz)
@@ -75,7 +76,8 @@ pub(super) fn parse(text: &str, rate_hz: Option<f64>) -> Result<Imported, Proble
             }
         }
         rules.push(format!(
-            "{} is N in {}; {} is the sigma of a Gauss-Markov drift in {} and {} its correlation time in s, as the code takes them",
+            "{} is N in {}; {} is the sigma of a Gauss-Markov drift in {} and {} its correlation time in s, as the \
+             code takes them",
             names.white.0, names.white.1, names.drift, names.unit, names.time
         ));
         if of_any(&drift, |sigma| sigma > 0.0) {

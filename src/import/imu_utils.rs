@@ -89,14 +89,16 @@ pub(super) fn parse(entries: &[Entry], rate_hz: Option<f64>) -> Result<Imported,
         }
         if dialect == Dialect::Early {
             warnings.push(format!(
-                "{white_key}/sqrt({} Hz) would lie below {walk_key}, the least value of the same curve: so this is a file of an early version, \
+                "{white_key}/sqrt({} Hz) would lie below {walk_key}, the least value of the same curve: so this is a \
+                 file of an early version, \
                  which wrote {white_key} = N",
                 digits(sample_rate_hz)
             ));
         }
         if dialect != Dialect::Densities {
             warnings.push(format!(
-                "{walk_key} is no random walk, and K cannot be got back from this file; the least value of a fitted Allan curve also has N and K in it, so that \
+                "{walk_key} is no random walk, and K cannot be got back from this file; the least value of a fitted \
+                 Allan curve also has N and K in it, so that \
                  the {}'s flicker is an upper limit",
                 sensor_name(quantity)
             ));
@@ -108,12 +110,14 @@ pub(super) fn parse(entries: &[Entry], rate_hz: Option<f64>) -> Result<Imported,
         };
         rules.push(match dialect {
             Dialect::Deviation => format!(
-                "{white_key} is the deviation of one sample: N = {white_key}/sqrt({} Hz); {walk_key} is the floor of the Allan deviation: flicker B = \
+                "{white_key} is the deviation of one sample: N = {white_key}/sqrt({} Hz); {walk_key} is the floor of \
+                 the Allan deviation: flicker B = \
                  {walk_key}/{FLICKER_FLOOR:.4}",
                 digits(sample_rate_hz)
             ),
             Dialect::Early => format!(
-                "{white_key} is the Allan deviation at 1 s: N = {white_key}; {walk_key} is its floor: flicker B = {walk_key}/{FLICKER_FLOOR:.4}"
+                "{white_key} is the Allan deviation at 1 s: N = {white_key}; {walk_key} is its floor: flicker B = \
+                 {walk_key}/{FLICKER_FLOOR:.4}"
             ),
             Dialect::Densities => format!("{white_key} is N and {walk_key} is K, both continuous: taken as they are"),
         });
@@ -139,7 +143,8 @@ fn is_early(entries: &[Entry], rate_hz: f64) -> Result<bool, Problem> {
 fn dialect(own: &[&Entry], section: &str, white_key: &str, quantity: Quantity) -> Result<Dialect, Problem> {
     let Some(unit) = own.iter().find(|e| e.key == "unit") else {
         return Err(Problem::whole(format!(
-            "{section} has no unit line, which alone tells the two kinds of imu_utils apart: a deviation per sample, or a density"
+            "{section} has no unit line, which alone tells the two kinds of imu_utils apart: a deviation per sample, \
+             or a density"
         )));
     };
     let said: String = unit.value.chars().filter(|c| !c.is_whitespace()).collect();

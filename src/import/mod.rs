@@ -126,7 +126,8 @@ fn parse(text: &str, rate_hz: Option<f64>) -> Result<Imported, Problem> {
         kalibr::parse(&entries, rate_hz)
     } else if entries.iter().any(|e| e.key == "gyr_n" || e.key == "acc_n") {
         Err(Problem::whole(
-            "gyr_n and acc_n of VINS are per step, N sqrt(2 rate) by its code and N sqrt(rate) by custom: the file does not say which, \
+            "gyr_n and acc_n of VINS are per step, N sqrt(2 rate) by its code and N sqrt(rate) by custom: the file \
+             does not say which, \
              so it is not read; type the densities with kfdesign datasheet",
         ))
     } else {

@@ -29,8 +29,9 @@ pub(super) const STEP: u64 = 64;
 pub(super) const JUMP: u64 = 1024;
 /// Of a name that is no column's: in the list that is kept, in a note, and in what is printed.
 const NAMED: u64 = 3;
-/// A column in a list of columns, without its name, in the copies that a command makes of it.
-const COLUMN: u64 = 640;
+/// What has a name, without it, in the copies that a command makes of it: in a list of columns or of topics, as a row
+/// of what `info` prints.
+const ENTRY: u64 = 640;
 /// Of its name: as header, column, and in the list that `info` prints.
 const COPIES: u64 = 10;
 
@@ -38,7 +39,8 @@ const COPIES: u64 = 10;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Excess {
     #[error(
-        "it declares what takes more memory than four times the file and 16 MiB; a log so compressed must be written in smaller blocks"
+        "it declares what takes more memory than four times the file and 16 MiB; a log so compressed must be written \
+         in smaller blocks"
     )]
     Memory,
     #[error("it unpacks to, or leads back and forth through, more than 1 GiB and 64 times the file")]
@@ -140,7 +142,7 @@ impl Account {
         if bytes > LONGEST_NAME {
             return Err(Excess::Name(bytes));
         }
-        self.hold(128 + NAMED * bytes as u64)
+        self.hold(ENTRY + NAMED * bytes as u64)
     }
 
     /// Columns with names of so many bytes each, or fewer.
@@ -148,7 +150,7 @@ impl Account {
         if name > LONGEST_NAME {
             return Err(Excess::Name(name));
         }
-        self.hold(count.saturating_mul(COLUMN + COPIES * name as u64))
+        self.hold(count.saturating_mul(ENTRY + COPIES * name as u64))
     }
 }
 

@@ -80,7 +80,7 @@ impl ArraySource {
             let (group, name) = array.path.rsplit_once(['/', '.']).unwrap_or(("", &array.path));
             let longest = array.fields.iter().map(String::len).max().unwrap_or(name.len() + 5);
             let held = account.columns(columns, longest).and_then(|()| account.columns(1, array.path.len()));
-            held.map_err(|excess| InputError { message: format!("{}: {excess}", path.display()) })?;
+            held.map_err(|excess| InputError::new(format!("{}: {excess}", path.display())))?;
             let at = *groups.entry((group.to_string(), rows)).or_insert_with(|| {
                 let mut topic = Topic::new(array.path.clone(), Vec::new());
                 topic.aliases.push(group.to_string());
@@ -101,7 +101,7 @@ impl ArraySource {
             let names: Vec<&str> = file.arrays().iter().take(40).map(|a| a.path.as_str()).collect();
             let found = if names.is_empty() { "none at all".into() } else { format!("only {}", names.join(", ")) };
             let message = format!("{}: no array of two or more rows of numbers; there is {found}", path.display());
-            return Err(InputError { message });
+            return Err(InputError::new(message));
         }
         let (path, account, rate) = (path.to_path_buf(), account.clone(), rate(file.scalars()));
         Ok(ArraySource { path, account, rate, format: file.format(), file: Arc::new(Mutex::new(file)), topics, places })
@@ -244,9 +244,10 @@ impl ArrayTable {
         let short =
             loaded.values.iter().any(|column| column.len() != rows) || (time.is_some() && loaded.time.len() != rows);
         if short {
-            return Err(InputError {
-                message: format!("{}: truncated: an array holds fewer numbers than it declares", self.path.display()),
-            });
+            return Err(InputError::new(format!(
+                "{}: truncated: an array holds fewer numbers than it declares",
+                self.path.display()
+            )));
         }
         Ok(loaded)
     }

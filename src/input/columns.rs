@@ -56,8 +56,35 @@ pub(super) fn quantity_of(unit: &Unit, kind: InputKind) -> Option<Quantity> {
 }
 
 impl Table<'_> {
-    /// Time column and axes for these options.
+    /// Time column and axes for these options. What is missing is said at once, not one thing after the other: where
+    /// an option is missing, the search goes on as if it were there.
     pub(super) fn choose(&self, options: &LogOptions) -> Result<Choice, InputError> {
+        let mut all: Option<InputError> = None;
+        let mut as_if = options.clone();
+        loop {
+            match (self.chosen(&as_if), &mut all) {
+                (Ok(choice), None) => return Ok(choice),
+                (Err(error), None) if error.missing.is_empty() => return Err(error),
+                (Err(error), None) => all = Some(error),
+                (Err(error), Some(all)) if error.missing.iter().any(|new| !all.missing.contains(new)) => {
+                    all.message +=
+                        &format!("; {}", error.message.trim_start_matches(self.place).trim_start_matches(": "));
+                    all.missing.extend(error.missing);
+                }
+                (_, Some(_)) => return Err(all.unwrap_or_else(|| InputError::new(self.place))),
+            }
+            for (option, value) in all.iter().flat_map(|all| &all.missing) {
+                match *option {
+                    "columns" => as_if.columns = Some(value.split(',').map(String::from).collect()),
+                    "unit" => as_if.unit = Unit::parse(value).ok(),
+                    "time" => as_if.time = Some(value.clone()),
+                    _ => as_if.rate_hz = value.parse().ok(),
+                }
+            }
+        }
+    }
+
+    fn chosen(&self, options: &LogOptions) -> Result<Choice, InputError> {
         let columns = match &options.columns {
             Some(list) => self.listed(list)?,
             None => self.by_name(options)?,
@@ -88,8 +115,12 @@ impl Table<'_> {
         Ok(Choice { time, columns, axes, stored, quantity, temperature, extra })
     }
 
+    fn error(&self, what: impl std::fmt::Display) -> InputError {
+        InputError::new(format!("{}: {what}", self.place))
+    }
+
     pub(super) fn fail<T>(&self, what: impl std::fmt::Display) -> Result<T, InputError> {
-        Err(InputError { message: format!("{}: {what}", self.place) })
+        Err(self.error(what))
     }
 
     /// `1 time, 2 gx, 3 gy`
@@ -178,9 +209,13 @@ impl Table<'_> {
         if !self.named {
             return match self.heads.len() {
                 1 => Ok(vec![0]),
-                n => self.fail(format!(
-                    "no header names the {n} columns; say which with `columns`, for example `columns` 1,2,3"
-                )),
+                n => {
+                    let columns = self.guess();
+                    let why = format!(
+                        "no header names the {n} columns; say which with `columns`, for example `columns` {columns}"
+                    );
+                    self.error(why).lacking("columns", columns)
+                }
             };
         }
         let mut candidates = self.candidates(options.kind);
@@ -203,17 +238,29 @@ impl Table<'_> {
             (_, Quantity::SpecificForce) => "accelerometer",
         };
         let Some(first) = candidates.first() else {
-            return self.fail(format!(
+            let why = format!(
                 "no {sensor} column is known by its name or unit; say which with `columns`; {}",
                 self.there_are()
-            ));
+            );
+            return self.error(why).lacking("columns", self.guess());
         };
         if candidates.iter().any(|c| c.stem != first.stem) {
             let names: Vec<String> = candidates.iter().map(|c| format!("'{}'", self.heads[c.column].full)).collect();
-            return self
-                .fail(format!("more than one sensor could be meant: {}; choose with `columns`", names.join(", ")));
+            let one = candidates.iter().filter(|c| c.stem == first.stem).map(|c| self.heads[c.column].full.clone());
+            let why = format!("more than one sensor could be meant: {}; choose with `columns`", names.join(", "));
+            return self.error(why).lacking("columns", one.collect::<Vec<_>>().join(","));
         }
         Ok(candidates.iter().map(|c| c.column).collect())
+    }
+
+    /// Columns that may be meant where nothing says it: three, without the first of four, which is mostly the time.
+    fn guess(&self) -> &'static str {
+        match self.heads.len() {
+            0 | 1 => "1",
+            2 => "1,2",
+            3 => "1,2,3",
+            _ => "2,3,4",
+        }
     }
 
     /// Unit of an extra column.
@@ -257,7 +304,10 @@ impl Table<'_> {
                         },
                         None => format!("the header gives no unit for column '{}'", head.full),
                     };
-                    return self.fail(format!("{why}; say it with `unit`, for example `unit` deg/s"));
+                    let unit = if quantity == Some(Quantity::SpecificForce) { "m/s^2" } else { "deg/s" };
+                    return self
+                        .error(format!("{why}; say it with `unit`, for example `unit` {unit}"))
+                        .lacking("unit", unit);
                 }
             };
             let wanted = quantity.or_else(|| quantity_of(&unit, options.kind)).unwrap_or_else(|| {
@@ -309,9 +359,11 @@ impl Table<'_> {
                     Some(rate) => format!("take the {rate} Hz that the file says with `time` none"),
                     None => "give `rate` HZ".into(),
                 };
-                return self.fail(format!(
-                    "time column '{name}' has no unit; say it with `time` '{name}:s' (or ms, us, ns), or {or}"
-                ));
+                return self
+                    .error(format!(
+                        "time column '{name}' has no unit; say it with `time` '{name}:s' (or ms, us, ns), or {or}"
+                    ))
+                    .lacking("time", format!("{name}:s"));
             }
         };
         match unit.require(Dimension::TIME) {
@@ -323,7 +375,9 @@ impl Table<'_> {
     fn no_time(&self, options: &LogOptions) -> Result<Option<(usize, Unit)>, InputError> {
         match options.rate_hz.or(self.rate_hz) {
             Some(_) => Ok(None),
-            None => self.fail("no sample rate: no time column is used; give `rate` HZ, or `time` COLUMN"),
+            None => self
+                .error("no sample rate: no time column is used; give `rate` HZ, or `time` COLUMN")
+                .lacking("rate", "100"),
         }
     }
 

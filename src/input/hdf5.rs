@@ -79,7 +79,7 @@ impl Store {
 
 impl Hdf5 {
     pub(super) fn open(path: &Path, account: &Account) -> Result<Hdf5, InputError> {
-        Self::read(path, account).map_err(|what| InputError { message: format!("{}: {what}", path.display()) })
+        Self::read(path, account).map_err(|what| InputError::new(format!("{}: {what}", path.display())))
     }
 
     fn read(path: &Path, account: &Account) -> Result<Hdf5, String> {
@@ -241,8 +241,8 @@ impl ArrayFile for Hdf5 {
             0 => put(first, second, dataset.datatype.number(0, bytes)),
             _ => (0..fields).for_each(|field| put(first, field as u64, dataset.datatype.number(field, bytes))),
         });
-        loaded.map_err(|what| InputError {
-            message: format!("{}: {what} (in '{}')", self.path.display(), self.arrays[array].path),
+        loaded.map_err(|what| {
+            InputError::new(format!("{}: {what} (in '{}')", self.path.display(), self.arrays[array].path))
         })
     }
 }

@@ -76,7 +76,7 @@ impl Mat {
             io::ErrorKind::InvalidData | io::ErrorKind::InvalidInput => format!("damaged: {error}"),
             _ => format!("cannot read: {error}"),
         };
-        Err(InputError { message: format!("{}: {what}", self.path.display()) })
+        Err(InputError::new(format!("{}: {what}", self.path.display())))
     }
 
     /// Finds all variables.

@@ -97,6 +97,19 @@ pub struct ExtraColumn {
 #[error("{message}")]
 pub struct InputError {
     pub message: String,
+    /// Options that would answer what the log does not say, each with a value that may be right.
+    pub missing: Vec<(&'static str, String)>,
+}
+
+impl InputError {
+    pub fn new(message: impl Into<String>) -> InputError {
+        InputError { message: message.into(), missing: Vec::new() }
+    }
+
+    fn lacking<T>(mut self, option: &'static str, value: impl Into<String>) -> Result<T, InputError> {
+        self.missing.push((option, value.into()));
+        Err(self)
+    }
 }
 
 /// One axis as found in the log.
@@ -179,7 +192,7 @@ struct Scan {
 
 impl Log {
     fn open(path: &Path, options: &LogOptions) -> Result<Log, InputError> {
-        let fail = |what: &str| Err(InputError { message: format!("{}: {what}", path.display()) });
+        let fail = |what: &str| Err(InputError::new(format!("{}: {what}", path.display())));
         if options.rate_hz.is_some_and(|rate| !rate.is_finite() || rate <= 0.0) {
             return fail("`rate` must be a positive number of Hz");
         }
@@ -236,14 +249,12 @@ impl Log {
         let heads = self.table.heads();
         let column = self.choice.time.as_ref().map_or(0, |(column, _)| *column);
         let table = columns::Table { heads: &heads, named: self.table.named(), place: "", rate_hz: None };
-        InputError {
-            message: format!(
-                "{}, column '{}': the time stamp is empty; choose another with `time`{}, or give `rate` HZ",
-                self.table.row_place(rows.line(empty)),
-                heads[column].full,
-                table.other_times(column)
-            ),
-        }
+        InputError::new(format!(
+            "{}, column '{}': the time stamp is empty; choose another with `time`{}, or give `rate` HZ",
+            self.table.row_place(rows.line(empty)),
+            heads[column].full,
+            table.other_times(column)
+        ))
     }
 
     /// The next parts: read, and then made ready on all threads.
@@ -346,7 +357,7 @@ impl Log {
     }
 
     fn fail<T>(&self, what: impl std::fmt::Display) -> Result<T, InputError> {
-        Err(InputError { message: format!("{}: {what}", self.table.place()) })
+        Err(InputError::new(format!("{}: {what}", self.table.place())))
     }
 
     fn enough(&self, rows: u64, selection: &Selection) -> Result<(), InputError> {
@@ -359,14 +370,13 @@ impl Log {
     }
 
     fn backward(&self, back: &BackwardStamp, line: u64) -> InputError {
-        InputError {
-            message: format!(
-                "{}: time goes back from {:.6} s to {:.6} s after the start of the log; stop before it with `end`, or give `rate` HZ to ignore the stamps",
-                self.table.row_place(line),
-                back.from_s,
-                back.to_s
-            ),
-        }
+        InputError::new(format!(
+            "{}: time goes back from {:.6} s to {:.6} s after the start of the log; stop before it with `end`, or give \
+             `rate` HZ to ignore the stamps",
+            self.table.row_place(line),
+            back.from_s,
+            back.to_s
+        ))
     }
 
     /// Refuses an axis in which nothing can be analysed.
@@ -504,7 +514,7 @@ pub fn read(path: &Path, options: &LogOptions) -> Result<(Recording, LogCheck), 
 
 /// Hex SHA-256 of the file's bytes as stored.
 pub fn sha256(path: &Path) -> Result<String, InputError> {
-    let fail = |error: std::io::Error| InputError { message: format!("{}: cannot read: {error}", path.display()) };
+    let fail = |error: std::io::Error| InputError::new(format!("{}: cannot read: {error}", path.display()));
     let mut file = std::fs::File::open(path).map_err(fail)?;
     let mut hash = Sha256::new();
     let mut buffer = vec![0u8; 1 << 16];

@@ -49,12 +49,12 @@ pub(super) struct NpyTable {
 }
 
 fn fail<T>(path: &Path, what: impl std::fmt::Display) -> Result<T, InputError> {
-    Err(InputError { message: format!("{}: {what}", path.display()) })
+    Err(InputError::new(format!("{}: {what}", path.display())))
 }
 
 impl NpyTable {
     pub(super) fn open(path: &Path, account: &Account) -> Result<NpyTable, InputError> {
-        let io = |error: std::io::Error| InputError { message: format!("{}: cannot read: {error}", path.display()) };
+        let io = |error: std::io::Error| InputError::new(format!("{}: cannot read: {error}", path.display()));
         let mut file = File::open(path).map_err(io)?;
         let length = file.metadata().map_err(io)?.len();
         if length == 0 {

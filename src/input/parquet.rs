@@ -77,7 +77,7 @@ struct Group {
 
 impl ParquetTable {
     pub(super) fn open(path: &Path, account: &Account) -> Result<ParquetTable, InputError> {
-        let fail = |what: String| Err(InputError { message: format!("{}: {what}", path.display()) });
+        let fail = |what: String| Err(InputError::new(format!("{}: {what}", path.display())));
         let file = match File::open(path) {
             Ok(file) => file,
             Err(error) => return fail(format!("cannot read: {error}")),
@@ -119,7 +119,7 @@ impl ParquetTable {
     }
 
     fn fail<T>(&self, what: &str) -> Result<T, InputError> {
-        Err(InputError { message: format!("{}: row group {}: {what}", self.path.display(), self.group) })
+        Err(InputError::new(format!("{}: row group {}: {what}", self.path.display(), self.group)))
     }
 
     /// Opens the next row group with rows; false at the end.

@@ -138,7 +138,7 @@ impl Source for RecordSource {
 }
 
 pub(super) fn failure(path: &Path, what: &str) -> InputError {
-    InputError { message: format!("{}: {what}", path.display()) }
+    InputError::new(format!("{}: {what}", path.display()))
 }
 
 struct RecordTable {

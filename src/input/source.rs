@@ -38,13 +38,13 @@ impl Source for Single {
         &self.topic
     }
     fn table(&mut self, _: usize) -> Result<Box<dyn Table + Send>, InputError> {
-        self.table.take().ok_or_else(|| InputError { message: "its only table is being read".into() })
+        self.table.take().ok_or_else(|| InputError::new("its only table is being read"))
     }
 }
 
 /// The file of a log: itself, or the one in a folder of the EuRoC (ASL) layout or of a ROS 2 bag.
 pub(super) fn resolve(path: &Path) -> Result<PathBuf, InputError> {
-    let fail = |what: String| Err(InputError { message: format!("{}: {what}", path.display()) });
+    let fail = |what: String| Err(InputError::new(format!("{}: {what}", path.display())));
     match std::fs::metadata(path) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return fail("there is no such file".into()),
         Err(error) => return fail(format!("cannot read: {error}")),
@@ -73,7 +73,7 @@ pub(super) fn resolve(path: &Path) -> Result<PathBuf, InputError> {
 
 /// Opens a log of any format.
 pub(super) fn open(path: &Path) -> Result<Box<dyn Source>, InputError> {
-    let fail = |what: String| Err(InputError { message: format!("{}: {what}", path.display()) });
+    let fail = |what: String| Err(InputError::new(format!("{}: {what}", path.display())));
     let mut start = Vec::new();
     let opened = File::open(path).and_then(|file| {
         let length = file.metadata()?.len();
@@ -122,7 +122,7 @@ pub(super) fn choose(
     mut source: Box<dyn Source>,
     options: &LogOptions,
 ) -> Result<(Box<dyn Table + Send>, Option<String>), InputError> {
-    let fail = |what: String| Err(InputError { message: format!("{}: {what}", path.display()) });
+    let fail = |what: String| Err(InputError::new(format!("{}: {what}", path.display())));
     let topics = source.topics();
     if let Some(wanted) = &options.topic {
         let lower = wanted.trim().to_lowercase();

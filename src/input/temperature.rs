@@ -98,7 +98,8 @@ impl Table<'_> {
                         Temperature { column: Some((column, info)), note: None }
                     }
                     None => Temperature::passed_over(format!(
-                        "column '{0}' looks like a temperature, but its unit is not known; say it with `temperature` \"{0}:degC\" (or K, degF)",
+                        "column '{0}' looks like a temperature, but its unit is not known; say it with `temperature` \
+                         \"{0}:degC\" (or K, degF)",
                         head.full
                     )),
                 }

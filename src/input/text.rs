@@ -58,7 +58,7 @@ struct Source {
 }
 
 fn fail<T>(path: &Path, what: impl std::fmt::Display) -> Result<T, InputError> {
-    Err(InputError { message: format!("{}: {what}", path.display()) })
+    Err(InputError::new(format!("{}: {what}", path.display())))
 }
 
 fn open(path: &Path, account: &Account) -> Result<Source, InputError> {
@@ -137,7 +137,7 @@ impl TextTable {
             Fault::TooLong => " is longer than 1 MiB: this is no text log".into(),
             Fault::Unreadable(error) => format!(": cannot read on: {error}"),
         };
-        InputError { message: format!("{}: line {}{what}", self.path.display(), self.line_number) }
+        InputError::new(format!("{}: line {}{what}", self.path.display(), self.line_number))
     }
 
     /// The next line without its end; false at the end of the file.
@@ -302,7 +302,8 @@ fn not_text(bytes: &[u8]) -> Option<String> {
         None => return None,
     };
     Some(format!(
-        "this is {what}; text (csv, also .gz), .npy, MATLAB, HDF5, Parquet, ULog, DataFlash .bin, ROS bags and MCAP are read"
+        "this is {what}; text (csv, also .gz), .npy, MATLAB, HDF5, Parquet, ULog, DataFlash .bin, ROS bags and MCAP \
+         are read"
     ))
 }
 

@@ -209,7 +209,8 @@ fn direction_in_words(direction: &[(String, f64)]) -> String {
     }
     let (names, change) = in_words(direction);
     format!(
-        "{names} cannot be told apart: a change of {change} leaves every measurement as it was; what the measurement sees of them together is \
+        "{names} cannot be told apart: a change of {change} leaves every measurement as it was; what the measurement \
+         sees of them together is \
          estimated, the split rests on P0."
     )
 }
@@ -223,7 +224,8 @@ pub fn undetermined(direction: &[(String, f64)]) -> String {
     }
     let (names, change) = in_words(direction);
     format!(
-        "{names} cannot be told apart: a change of {change} leaves every measurement as it was, and noise drives it; add a measurement (an \
+        "{names} cannot be told apart: a change of {change} leaves every measurement as it was, and noise drives it; \
+         add a measurement (an \
          aid) that sees one of them"
     )
 }
@@ -256,7 +258,8 @@ fn told_apart(model: &LinearModel, constant: &str) -> Vec<String> {
             let tc = -model.dt / pole.ln();
             let name = &model.states[i].name;
             lines.push(format!(
-                "{constant} and {name} (correlation time {} s) are told apart only through the drift's decay: {constant} is known to half \
+                "{constant} and {name} (correlation time {} s) are told apart only through the drift's decay: \
+                 {constant} is known to half \
                  the standard deviation of {name} after about {} s (8 correlation times), to a tenth after {} s (200).",
                 digits(tc),
                 digits(8.0 * tc),

@@ -31,11 +31,11 @@ pub(super) fn credibility(mean_log: f64, moments: &[Vec<f64>], size: usize, inde
         10.0 * moments.iter().map(|m| mean_absolute_log(m, size, &directions)).sum::<f64>() / moments.len() as f64;
     let size_db = format!("{:.2} dB", inclination_db.abs());
     let meaning = if inclination_db.abs() <= 3.0 * standard_error_db {
-        "the filter is as proud as its errors allow".to_string()
+        "the errors are as large as the covariance says".to_string()
     } else if inclination_db > 0.0 {
-        format!("too proud: the squared errors are {size_db} larger than the claimed covariance")
+        format!("optimistic: the squared errors are {size_db} larger than the claimed covariance")
     } else {
-        format!("too timid: the squared errors are {size_db} smaller than the claimed covariance")
+        format!("pessimistic: the squared errors are {size_db} smaller than the claimed covariance")
     };
     Some(Credibility { nci_db, inclination_db, standard_error_db, meaning })
 }

@@ -67,7 +67,8 @@ pub enum MonteCarloError {
     #[error("{name} is {value}, expected {expected}")]
     Plan { name: &'static str, value: f64, expected: String },
     #[error(
-        "axis '{axis}': measurement '{name}' is taken every {every} samples, but a run has {steps}; expected two in a run: make the duration \
+        "axis '{axis}': measurement '{name}' is taken every {every} samples, but a run has {steps}; expected two in a \
+         run: make the duration \
          longer"
     )]
     Updates { axis: String, name: String, every: u64, steps: u64 },
@@ -82,7 +83,8 @@ pub enum MonteCarloError {
     #[error("the truth is {truth}, the filter {filter}")]
     Quantity { truth: &'static str, filter: &'static str },
     #[error(
-        "axis '{axis}': no parameter has an interval to draw from; give them in the truth's parameters (\"interval\": [lower, upper]), as identify does"
+        "axis '{axis}': no parameter has an interval to draw from; give them in the truth's parameters (\"interval\": \
+         [lower, upper]), as identify does"
     )]
     NoIntervals { axis: String },
     #[error("{path}: {key}: {message}")]

@@ -91,7 +91,7 @@ pub struct NeesAverage {
 pub struct Credibility {
     /// Noncredibility index, dB: 0 for a perfect covariance; sampling alone gives a little.
     pub nci_db: f64,
-    /// Inclination, dB: positive when the filter is too proud, negative when it is too timid.
+    /// Inclination, dB: positive when the filter is optimistic, negative when it is pessimistic.
     pub inclination_db: f64,
     /// Of the inclination.
     pub standard_error_db: f64,

@@ -97,10 +97,12 @@ pub(super) fn low_frequency(value: f64, bounds: [f64; 2], seconds: f64) -> Strin
     let (ratio, seconds) = (digits(value), digits(seconds));
     match side(value, bounds) {
         Some(true) => format!(
-            "optimistic about slow drift: averaged over {seconds} s the innovations have {ratio} times the power that the filter says"
+            "optimistic about slow drift: averaged over {seconds} s the innovations have {ratio} times the power that \
+             the filter says"
         ),
         Some(false) => format!(
-            "pessimistic about slow drift: averaged over {seconds} s the innovations have only {ratio} times the power that the filter says"
+            "pessimistic about slow drift: averaged over {seconds} s the innovations have only {ratio} times the power \
+             that the filter says"
         ),
         None => "slow innovations are as large as the filter says".into(),
     }
@@ -119,7 +121,8 @@ pub(super) fn unsettled(course: &Course) -> String {
         return String::new();
     }
     format!(
-        "; runs of {} s end before the filter has settled: {}; judged is the way there, not the settled filter, which a longer `duration` judges",
+        "; runs of {} s end before the filter has settled: {}; judged is the way there, not the settled filter, which \
+         a longer `duration` judges",
         digits(duration),
         slow.join(", ")
     )

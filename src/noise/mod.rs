@@ -75,7 +75,8 @@ pub enum Term {
 /// A line that a log of this rate cannot show where it is.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "oscillation at {} Hz is not below half the sample rate of {} Hz; give the frequency at which it stands in the log ({} Hz), \
+    "oscillation at {} Hz is not below half the sample rate of {} Hz; give the frequency at which it stands in the log \
+     ({} Hz), \
      or a higher rate",
     digits(*.frequency_hz), digits(1.0 / .dt), digits((.frequency_hz - (.frequency_hz * .dt).round() / .dt).abs())
 )]

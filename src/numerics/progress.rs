@@ -24,6 +24,9 @@ pub trait Progress: Send + Sync {
     /// A line about what the work was given: a check of a log, a column that was chosen.
     fn note(&self, _line: &str) {}
 
+    /// A line about what may make the result worth less.
+    fn warning(&self, _line: &str) {}
+
     /// Whether the work should end. Asked every few milliseconds by every thread, so it should do next to nothing.
     fn is_stopped(&self) -> bool {
         false
@@ -56,6 +59,19 @@ pub fn watched<T: Send>(watch: &Arc<dyn Progress>, work: impl FnOnce() -> T + Se
     done.map_err(|why| if is_stop(&*why) { Stopped } else { resume_unwind(why) })
 }
 
+/// Does the work on so many threads, which know who waits; `None`: on those that are there. Where there are no more
+/// threads to be had, those that are there do the work.
+pub fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> T {
+    let watch = WATCH.with_borrow(Clone::clone);
+    let pool = |threads| {
+        ThreadPoolBuilder::new().num_threads(threads).start_handler(move |_| WATCH.set(watch.clone())).build()
+    };
+    match threads.map(pool) {
+        Some(Ok(pool)) => pool.install(work),
+        Some(Err(_)) | None => work(),
+    }
+}
+
 /// Who waited before, who waits again when this is dropped.
 struct Before(Option<Arc<dyn Progress>>);
 
@@ -86,6 +102,11 @@ pub fn advance(parts: u64) {
 /// A line about what the work was given. Nobody hears it where nobody waits: what matters is in the result, too.
 pub fn note(line: &str) {
     WATCH.with_borrow(|watch| watch.iter().for_each(|watch| watch.note(line)));
+}
+
+/// A line about what may make the result worth less. As with [`note`], it is in the result, too.
+pub fn warning(line: &str) {
+    WATCH.with_borrow(|watch| watch.iter().for_each(|watch| watch.warning(line)));
 }
 
 /// Whether this is the end of work that was asked to stop: who catches panics hands it on.

@@ -12,7 +12,7 @@ use super::stretch::stretches;
 use crate::compare::parameters::parameters;
 use crate::compare::{self, Comparison, Log, LogAxis};
 use crate::import::{self, ImportError};
-use crate::numerics::progress::note;
+use crate::numerics::progress::{note, warning};
 use crate::params::{AxisParams, Params};
 use crate::replay::axes::partners;
 use crate::signal::LogCheck;
@@ -68,9 +68,11 @@ impl Pair {
 
 /// Reads both, with the log check as notes.
 pub(super) fn read(params: &Path, log: &Path, reading: &Reading) -> anyhow::Result<Pair> {
+    checked::not_swapped(params, log, "PARAMS LOG")?;
     let given = given(params)?;
     let options = reading.options()?;
-    let (recording, check) = crate::input::read(log, &options)?;
+    let known = given.iter().find_map(|params| params.source.as_ref()?.reading.as_ref());
+    let (recording, check) = reading.read(known, |options| crate::input::read(log, &options))?;
     note_check(&recording.name, &check);
     let mut params = of_quantity(given, recording.quantity, params)?;
     let parts = stretches(&recording, options.kind);
@@ -113,7 +115,7 @@ fn given(path: &Path) -> anyhow::Result<Vec<Params>> {
         }
         _ => anyhow!(error),
     })?;
-    found.warnings.iter().for_each(|warning| note(&format!("  warning: {warning}")));
+    found.warnings.iter().for_each(|line| warning(line));
     Ok(found.sensors)
 }
 
@@ -141,7 +143,8 @@ pub fn run(request: &Request) -> anyhow::Result<(Comparison, Unit)> {
     }
     for axis in result.axes.iter_mut().filter(|axis| pair.check.moves(&axis.log_axis)) {
         axis.notes.push(
-            "the log is not at rest all the time (see the log check): motion counts as noise here; cut it with `start`/`end`"
+            "the log is not at rest all the time (see the log check): motion counts as noise here; cut it with \
+             `start`/`end`"
                 .into(),
         );
     }

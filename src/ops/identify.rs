@@ -61,9 +61,9 @@ pub struct Request {
     /// Leave outliers out: samples farther from their surroundings than normal noise goes. Where the rest has tails,
     /// those of Student's t, N holds their variance; where it has none, N is that of the noise without the outliers.
     /// Without this flag N holds the variance of all samples
-    #[arg(long)]
-    #[serde(default)]
-    pub robust: bool,
+    #[arg(long, alias = "robust")]
+    #[serde(default, alias = "robust")]
+    pub without_outliers: bool,
     /// Temperature column, beside whose regression the parameters are shown: name or 1-based number, with the unit
     /// if the header does not say it (temp:degC); `none` reads none [default: found by name]. The parameters written
     /// are those without
@@ -154,7 +154,7 @@ struct AxisDocument<'a> {
     /// Likelihood only, where the log has a temperature.
     #[serde(skip_serializing_if = "Option::is_none")]
     temperature: Option<TemperatureDocument<'a>>,
-    /// Excess kurtosis of the whitened log, which the intervals of the coefficients know; with --robust the law of
+    /// Excess kurtosis of the whitened log, which the intervals of the coefficients know; with --without-outliers the law of
     /// the noise, where it has tails.
     tails: Tails,
     /// Of several logs: whether each parameter is the same in all.
@@ -204,7 +204,8 @@ impl Log {
     fn warn_of_motion(&self, axis: &str, found: &mut Identified) {
         if self.checks.iter().any(|check| check.moves(axis)) {
             found.warnings.push(
-                "the log is not at rest all the time (see the log check): motion counts as drift here; cut it with `start`/`end`"
+                "the log is not at rest all the time (see the log check): motion counts as drift here; cut it with \
+                 `start`/`end`"
                     .into(),
             );
         }
@@ -227,7 +228,8 @@ pub fn run(request: &Request) -> anyhow::Result<Done> {
     let choice = parse_model(model)?;
     if method == MethodArg::Graphical && choice != ModelChoice::Auto {
         bail!(
-            "`model` {model}: the graphical recipe has one model (white noise and one Gauss-Markov process); leave `model` out"
+            "`model` {model}: the graphical recipe has one model (white noise and one Gauss-Markov process); leave \
+             `model` out"
         );
     }
     let by_curve = matches!(method, MethodArg::Allan | MethodArg::Gmwm);
@@ -268,6 +270,7 @@ pub fn run(request: &Request) -> anyhow::Result<Done> {
             note: held_note(&request.hold),
             inflation: Vec::new(),
             checks: checks::checks(&log.checks, &axes),
+            reading: request.reading.said(),
             between_logs: axes.iter().flat_map(|axis| words::between_logs(&axis.found)).collect(),
         }),
     };
@@ -424,8 +427,8 @@ fn identify(
     }
     // the first of the longest
     let longest = (0..parts.len()).rev().max_by_key(|i| parts[*i].rate.len()).unwrap_or(0);
-    let upsets = words::upset_words(&parts[longest], dt, request.robust);
-    let dropped: usize = if request.robust { parts.iter_mut().map(Stretch::drop_outliers).sum() } else { 0 };
+    let upsets = words::upset_words(&parts[longest], dt, request.without_outliers);
+    let dropped: usize = if request.without_outliers { parts.iter_mut().map(Stretch::drop_outliers).sum() } else { 0 };
     let (part, method) = (&parts[longest], request.method.method());
     let mut found = if method == Method::Likelihood {
         let logs: Vec<_> = parts.iter().map(Stretch::pieces).collect();
@@ -434,7 +437,7 @@ fn identify(
     } else {
         identify_axis(&part.name, &part.rate, dt, &part.unit, method, wanted.choice)?
     };
-    if request.robust {
+    if request.without_outliers {
         let used = if method == Method::Likelihood { &parts[..] } else { std::slice::from_ref(part) };
         let rates: Vec<&[f64]> = used.iter().map(|part| &part.rate[..]).collect();
         let outliers: Vec<&[usize]> = used.iter().map(|part| &part.outliers[..]).collect();

@@ -10,9 +10,11 @@ use crate::model::LinearModel;
 use crate::numerics::progress::{advance, begin};
 use crate::ops::aid_columns::aid_columns;
 use crate::ops::reading::{Reading, note_check};
+use crate::params::Reading as Known;
 use crate::replay::axes::assign;
 use crate::replay::{LogShape, Options, ReplayResult, Replayer};
 use crate::signal::LogCheck;
+use crate::tune::READING;
 use crate::tune::objective::Log;
 
 /// How logs are read, and the columns of the aids.
@@ -35,7 +37,10 @@ impl Logs<'_> {
         let name = path.display().to_string();
         let extra = aid_columns(self.aids, design)?;
         let aids = extra.len();
-        let reader = LogReader::open(path, &LogOptions { extra, ..self.reading.rates()? })?;
+        self.reading.rates()?;
+        let known = Known::of(&design.tuning, READING);
+        let open = |options| LogReader::open(path, &LogOptions { extra: extra.clone(), ..options });
+        let reader = self.reading.read(known.as_ref(), open)?;
         let mut check = reader.check().clone();
         // a plant's log is one that moves
         if design.plant != "static" {
@@ -52,7 +57,8 @@ impl Logs<'_> {
         let beside = |model: &LinearModel| model.measurements.len() - usize::from(model.inputs.is_empty());
         if design.axes.iter().map(|axis| beside(&axis.model)).sum::<usize>() != shape.aids {
             bail!(
-                "{name}: the plant has an input of its own beside the sensor; parameters are chosen on logs only where the sensor is the one input"
+                "{name}: the plant has an input of its own beside the sensor; parameters are chosen on logs only where \
+                 the sensor is the one input"
             );
         }
         let mut axes = vec![SensorLog::default(); design.axes.len()];

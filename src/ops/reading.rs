@@ -5,8 +5,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::amounts::with_unit;
-use crate::input::{InputKind, LogOptions, TemperatureColumn};
-use crate::numerics::progress::note;
+use crate::input::{InputError, InputKind, LogOptions, TemperatureColumn};
+use crate::numerics::progress::{note, warning};
+use crate::params::Reading as Known;
 use crate::signal::LogCheck;
 use crate::units::{Dimension, Quantity, Unit};
 
@@ -64,6 +65,55 @@ pub enum SensorArg {
 }
 
 impl Reading {
+    /// What was said of the log; `None`: nothing.
+    pub fn said(&self) -> Option<Known> {
+        let said = Known {
+            columns: self.columns.clone().unwrap_or_default(),
+            topic: self.topic.clone(),
+            time: self.time.clone(),
+            unit: self.unit.clone(),
+            rate: self.rate,
+        };
+        (said != Known::default()).then_some(said)
+    }
+
+    /// Reads a log; where it cannot be read without options that are not given, and `known` has them of the log behind
+    /// the parameters, with these, which is noted.
+    pub fn read<T>(
+        &self,
+        known: Option<&Known>,
+        read: impl Fn(LogOptions) -> Result<T, InputError>,
+    ) -> anyhow::Result<T> {
+        let (error, known) = match (read(self.options()?), known) {
+            (Ok(found), _) => return Ok(found),
+            (Err(error), None) => return Err(error.into()),
+            (Err(error), Some(known)) => (error, known),
+        };
+        let mut with = self.clone();
+        let mut added = Vec::new();
+        for (option, _) in &error.missing {
+            let (option, said) = match *option {
+                "columns" if !known.columns.is_empty() => {
+                    with.columns = Some(known.columns.clone());
+                    ("columns", known.columns.join(","))
+                }
+                "unit" => ("unit", take(&mut with.unit, &known.unit)),
+                // either gives the samples their time
+                "rate" | "time" if known.rate.is_some() => ("rate", take(&mut with.rate, &known.rate)),
+                "rate" | "time" => ("time", take(&mut with.time, &known.time)),
+                _ => continue,
+            };
+            if !said.is_empty() {
+                added.push(format!("`{option}` {said}"));
+            }
+        }
+        if added.len() < error.missing.len() || added.is_empty() {
+            return Err(error.into());
+        }
+        note(&format!("  note: read with {}, as the log behind the parameters was", added.join(" ")));
+        Ok(read(with.options()?)?)
+    }
+
     /// As [`Reading::options`], for what reads sample by sample and knows rates alone.
     pub fn rates(&self) -> anyhow::Result<LogOptions> {
         let flag = match self.input {
@@ -72,7 +122,8 @@ impl Reading {
             InputArg::Angle => "angle",
         };
         anyhow::bail!(
-            "`input` {flag}: a filter runs on rates, sample by sample; write the log as rates first (increments, or differences of angles, over the sample period)"
+            "`input` {flag}: a filter runs on rates, sample by sample; write the log as rates first (increments, or \
+             differences of angles, over the sample period)"
         )
     }
 
@@ -102,6 +153,12 @@ impl Reading {
     }
 }
 
+/// What is known in place of what was not said, as text.
+fn take<T: Clone + ToString>(said: &mut Option<T>, known: &Option<T>) -> String {
+    *said = known.clone();
+    known.as_ref().map(ToString::to_string).unwrap_or_default()
+}
+
 /// A time without a unit is in seconds.
 fn seconds(flag: &str, text: &str) -> anyhow::Result<f64> {
     match text.trim().parse::<f64>() {
@@ -120,6 +177,10 @@ pub fn note_check(name: &str, check: &LogCheck) {
         if check.findings.is_empty() { ", nothing unusual" } else { "" }
     ));
     for finding in &check.findings {
-        note(&format!("  {}: {}", if finding.serious { "warning" } else { "note" }, finding.message));
+        if finding.serious {
+            warning(&finding.message);
+        } else {
+            note(&format!("  note: {}", finding.message));
+        }
     }
 }

@@ -16,7 +16,7 @@ use crate::consistency::{Test, TestKind};
 use crate::export::table::TableWriter;
 use crate::filter::{AttitudeDesign, FilterDesign, Form};
 use crate::input::{Block, LogReader};
-use crate::numerics::progress::{advance, begin, note};
+use crate::numerics::progress::{advance, begin, note, warning};
 use crate::replay::attitude::AttitudeReplay;
 use crate::replay::{Estimates, LogShape, Options, ReplayResult, Replayer};
 use crate::signal::check::FindingKind;
@@ -52,9 +52,10 @@ pub struct Request {
     pub gate: Option<f64>,
     /// Samples further out than this many sigmas count as outliers: they move the estimate as far as one at that
     /// distance would, and are not judged (Masreliez and Martin 1977)
-    #[arg(long, value_name = "SIGMAS", conflicts_with_all = ["gate", "smooth"], allow_negative_numbers = true)]
-    #[serde(default)]
-    pub robust: Option<f64>,
+    #[arg(long, alias = "robust", value_name = "SIGMAS", conflicts_with_all = ["gate", "smooth"],
+        allow_negative_numbers = true)]
+    #[serde(default, alias = "robust")]
+    pub clip: Option<f64>,
     /// How the filter carries its covariance
     #[arg(long, value_enum, default_value_t = FormFlag::Joseph, conflicts_with = "smooth")]
     #[serde(default)]
@@ -107,8 +108,8 @@ impl Request {
         let follow = self.follow.as_deref().map(|text| with_unit("`follow`", text, Dimension::TIME, "1000s"));
         let options = Options {
             alpha: self.alpha,
-            gate: self.robust.or(self.gate),
-            clip: self.robust.is_some(),
+            gate: self.clip.or(self.gate),
+            clip: self.clip.is_some(),
             form: match self.form {
                 FormFlag::Joseph => Form::Joseph,
                 FormFlag::SquareRoot => Form::SquareRoot,
@@ -122,8 +123,8 @@ impl Request {
 
     /// That can be known before the files are opened.
     pub fn check(&self) -> anyhow::Result<()> {
-        if self.smooth && (self.innovations || self.robust.is_some() || self.follow.is_some()) {
-            bail!("`smooth` goes with none of `innovations`, `robust` and `follow`");
+        if self.smooth && (self.innovations || self.clip.is_some() || self.follow.is_some()) {
+            bail!("`smooth` goes with none of `innovations`, `clip` and `follow`");
         }
         self.options().map(|_| ())
     }
@@ -132,6 +133,7 @@ impl Request {
 /// Estimates go to `output` as the log is read. Notes say what the log is, and how its axes and rates fit the filter.
 pub fn run(request: &Request) -> anyhow::Result<Done> {
     request.check()?;
+    checked::not_swapped(&request.filter, &request.log, "FILTER LOG")?;
     if AttitudeDesign::is(&request.filter) {
         return attitude::run(request);
     }
@@ -158,8 +160,9 @@ fn note_rates(design: &FilterDesign, result: &ReplayResult) {
         let expected = (axis.samples / *every as u64).max(1) as f64;
         let ratio = (axis.accepted + axis.rejected) as f64 / expected;
         if *every > 1 && !(0.5..=2.0).contains(&ratio) {
-            note(&format!(
-                "  warning: {} has {} measurements in {} rows, the filter was made for one in {every}; empty the rows that repeat an \
+            warning(&format!(
+                "{} has {} measurements in {} rows, the filter was made for one in {every}; empty the rows that repeat \
+                 an \
                  older value, or tune with the aid's true rate",
                 axis.measurement,
                 axis.accepted + axis.rejected,
@@ -176,7 +179,8 @@ fn note_follow(request: &Request, result: &ReplayResult) {
     axes.dedup();
     if !axes.is_empty() && request.follow.is_none() && request.form == FormFlag::Joseph && !request.smooth {
         note(&format!(
-            "  note: the wideband noise is not what the design says ({}): `follow` DURATION finds it anew as the log goes on",
+            "  note: the wideband noise is not what the design says ({}): `follow` DURATION finds it anew as the log \
+             goes on",
             axes.join(", ")
         ));
     }

@@ -89,7 +89,8 @@ impl Stretch {
                 "the longest stretch without gaps and unusable samples {role}: {used} samples, {left_out} left out"
             ),
             filled => format!(
-                "a stretch with short holes {role}: {used} samples, {filled} of them missing and filled in there with noise as elsewhere in the log, {left_out} left out"
+                "a stretch with short holes {role}: {used} samples, {filled} of them missing and filled in there with \
+                 noise as elsewhere in the log, {left_out} left out"
             ),
         };
         (left_out + self.filled > 0).then(note)

@@ -21,7 +21,7 @@ use super::reading::Reading;
 use crate::consistency::Verdict;
 use crate::filter::FilterDesign;
 use crate::montecarlo::{Outcome, Plan, verify};
-use crate::numerics::progress::{begin, note};
+use crate::numerics::progress::{begin, warning};
 use crate::params::{Params, PlantEntry};
 use crate::replay::ReplayResult;
 use crate::tune::objective::{Objective, Record, Request as By, tune_by};
@@ -33,7 +33,7 @@ use crate::view::tune::Design;
 #[serde(deny_unknown_fields)]
 pub struct Request {
     /// Noise parameters
-    #[arg(required_unless_present = "compare")]
+    #[arg(required_unless_present = "rank")]
     #[serde(default)]
     pub params: Option<PathBuf>,
     /// Slowest time constant that the states for flicker cover
@@ -221,9 +221,7 @@ fn chosen(
         for log in &request.log {
             let (read, sha256) = logs_of.read(log, &nominal.design)?;
             if flags.objective == ObjectiveArg::Likelihood && !flags.no_prior && own.as_ref() == Some(&sha256) {
-                note(
-                    "  warning: the intervals come from this log, which now counts twice; give another one, or `no_prior`",
-                );
+                warning("the intervals come from this log, which now counts twice; give another one, or `no_prior`");
             }
             logs.push(read);
         }

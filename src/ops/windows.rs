@@ -119,7 +119,8 @@ impl Windows {
 pub(crate) fn note(axis: &str, windows: u64, length: &str, left_out: u64, joined: &str) -> anyhow::Result<String> {
     if windows == 0 {
         bail!(
-            "{axis}: no window of {length} s without gaps and unusable samples fits in the log; choose a shorter `window`"
+            "{axis}: no window of {length} s without gaps and unusable samples fits in the log; choose a shorter \
+             `window`"
         );
     }
     let mut note = format!("read in {windows} windows of {length} s, {joined}");

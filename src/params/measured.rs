@@ -156,7 +156,8 @@ impl JsonSchema for Measured {
     }
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
         json_schema!({
-            "description": "A value with its unit and, if known, its 95 % interval; as input also the short form \"0.0562 deg/s/sqrt(Hz)\".",
+            "description": "A value with its unit and, if known, its 95 % interval; as input also the short form \
+                            \"0.0562 deg/s/sqrt(Hz)\".",
             "anyOf": [
                 {
                     "type": "object",
@@ -164,7 +165,8 @@ impl JsonSchema for Measured {
                         "value": { "type": "number" },
                         "unit": { "type": "string" },
                         "interval": {
-                            "description": "Lower and upper end in the same unit, the value between them; null is an open end.",
+                            "description": "Lower and upper end in the same unit, the value between them; null is an \
+                                            open end.",
                             "type": "array",
                             "items": { "type": ["number", "null"] },
                             "minItems": 2,

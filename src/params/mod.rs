@@ -133,6 +133,23 @@ pub struct BetweenLogs {
     pub p_value: f64,
 }
 
+/// What had to be said of the log so that it could be read, in the words of the options of the same names.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Reading {
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub columns: Vec<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub topic: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
+    /// Hz.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rate: Option<f64>,
+}
+
 /// Where the numbers come from.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Source {
@@ -150,6 +167,15 @@ pub struct Source {
     pub checks: Vec<Check>,
     /// Of several logs: what differs between them.
     pub between_logs: Vec<BetweenLogs>,
+    /// None: nothing had to be said.
+    pub reading: Option<Reading>,
+}
+
+impl Reading {
+    /// What a document says at `key`; nothing where that is no such record.
+    pub fn of(record: &serde_json::Value, key: &str) -> Option<Reading> {
+        source::reading(&Place::at(key, record.get(key)?)).ok()
+    }
 }
 
 impl Source {

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::axis::{in_unit, seconds};
 use super::place::{KeyError, Place};
-use super::{BetweenLogs, Check, CheckKind, Inflated, Measured, Source};
+use super::{BetweenLogs, Check, CheckKind, Inflated, Measured, Reading, Source};
 
 /// Where the numbers come from.
 #[derive(Serialize, JsonSchema)]
@@ -36,6 +36,9 @@ pub(super) struct SourceDocument {
     /// Of several logs: parameters that are not the same in all.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     between_logs: Vec<BetweenLogs>,
+    /// How the log was read, for the next log of the same kind.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reading: Option<Reading>,
 }
 
 impl From<&Source> for SourceDocument {
@@ -51,6 +54,7 @@ impl From<&Source> for SourceDocument {
             inflation: source.inflation.clone(),
             checks: source.checks.clone(),
             between_logs: source.between_logs.clone(),
+            reading: source.reading.clone(),
         }
     }
 }
@@ -67,6 +71,7 @@ pub(super) fn source(place: &Place<'_>) -> Result<Source, KeyError> {
         "inflation",
         "checks",
         "between_logs",
+        "reading",
     ])?;
     let text = |key: &str| object.optional(key).map(|p| p.text().map(str::to_string)).transpose();
     Ok(Source {
@@ -89,6 +94,21 @@ pub(super) fn source(place: &Place<'_>) -> Result<Source, KeyError> {
             Some(list) => list.list()?.iter().map(between_logs).collect::<Result<_, _>>()?,
             None => Vec::new(),
         },
+        reading: object.optional("reading").map(|p| reading(&p)).transpose()?,
+    })
+}
+
+/// Of a log: in params.json, and in the record of the tuning in filter.json.
+pub(super) fn reading(place: &Place<'_>) -> Result<Reading, KeyError> {
+    let object = place.object(&["columns", "topic", "time", "unit", "rate"])?;
+    let text = |key: &str| object.optional(key).map(|p| p.text().map(str::to_string)).transpose();
+    let columns = object.optional("columns").map(|p| p.list()).transpose()?.unwrap_or_default();
+    Ok(Reading {
+        columns: columns.iter().map(|p| p.text().map(str::to_string)).collect::<Result<_, _>>()?,
+        topic: text("topic")?,
+        time: text("time")?,
+        unit: text("unit")?,
+        rate: object.optional("rate").map(|p| p.number()).transpose()?,
     })
 }
 

@@ -70,7 +70,7 @@ impl Options {
         }
         match self.gate {
             Some(gate) if !(gate >= 1.0 && gate.is_finite()) => {
-                let name = if self.clip { "robust" } else { "gate" };
+                let name = if self.clip { "clip" } else { "gate" };
                 Err(ReplayError::Option { name, value: gate, expected: "at least 1 (sigmas)" })
             }
             _ => Ok(()),
@@ -149,24 +149,29 @@ impl Roles {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ReplayError {
     #[error(
-        "the log is in {log} but the filter is for {filter}: choose the columns with `columns` or `sensor`, or give the right filter"
+        "the log is in {log} but the filter is for {filter}: choose the columns with `columns` or `sensor`, or give \
+         the right filter"
     )]
     Quantity { log: &'static str, filter: &'static str },
     #[error(
-        "the log has {log_hz} Hz but the filter is for {filter_hz} Hz ({percent:.2} % apart, 0.5 % are allowed): identify and tune at the log's rate, or correct the rate with `rate`"
+        "the log has {log_hz} Hz but the filter is for {filter_hz} Hz ({percent:.2} % apart, 0.5 % are allowed): \
+         identify and tune at the log's rate, or correct the rate with `rate`"
     )]
     Rate { log_hz: f64, filter_hz: f64, percent: f64 },
     #[error(
-        "cannot tell which axis is which: the log has {log}, the filter has {filter}; choose with `columns`, in the order of the filter's axes"
+        "cannot tell which axis is which: the log has {log}, the filter has {filter}; choose with `columns`, in the \
+         order of the filter's axes"
     )]
     Axes { log: String, filter: String },
     #[error(
-        "the filter of plant '{plant}' measures {names} beside the sensor, the log gives {found} such columns; name the columns, one per \
+        "the filter of plant '{plant}' measures {names} beside the sensor, the log gives {found} such columns; name \
+         the columns, one per \
          axis: replay `aid` NAME=COLUMN"
     )]
     Aids { plant: String, names: String, found: usize },
     #[error(
-        "the filter is for a custom plant, and its 'design' section, which says what the sensor is, is not there; write it with tune"
+        "the filter is for a custom plant, and its 'design' section, which says what the sensor is, is not there; \
+         write it with tune"
     )]
     CustomUntold,
     #[error("the plant has the inputs {inputs}; replay handles one, montecarlo judges this filter on simulated runs")]

@@ -256,7 +256,8 @@ fn start_test(axis: &str, score: f64, information: f64, alpha: f64) -> (Start, T
     let bound = normal_quantile(1.0 - alpha / 2.0);
     let meaning = if z.abs() > bound {
         format!(
-            "the log starts {} sigma from x0: its bias is outside what P0 allows; raise the turn-on bias (the other tests feel this start too)",
+            "the log starts {} sigma from x0: its bias is outside what P0 allows; raise the turn-on bias (the other \
+             tests feel this start too)",
             digits(sigmas)
         )
     } else {

@@ -12,13 +12,11 @@ use serde::{Serialize, Serializer};
 
 use crate::consistency::Verdict;
 
-/// The least detail at which something is shown; each level has all that the levels before it have.
+/// The least detail at which a block of a section is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Level {
-    /// The answer.
-    Brief,
-    /// Everything that a terminal shows.
+    /// Where everything is shown.
     #[default]
     Full,
     /// On the page alone.
@@ -32,12 +30,18 @@ pub struct Report<'a> {
     /// One line under the title: what this is about.
     pub subtitle: String,
     pub verdict: Option<Conclusion>,
+    /// What a person acts on, in a few lines; its heading says what this is about.
+    #[serde(skip)]
+    pub answer: Section<'a>,
     /// Label and value: log, samples, method, version, seed.
     pub provenance: Vec<(String, String)>,
     pub sections: Vec<Section<'a>>,
     /// What was written where, one line each; a page does not say it.
     #[serde(skip)]
     pub written: Vec<String>,
+    /// The command that mostly comes next.
+    #[serde(skip)]
+    pub next: Option<String>,
 }
 
 /// The verdict in words with its sentence.
@@ -47,6 +51,9 @@ pub struct Conclusion {
     pub word: String,
     /// What was decided and at which level.
     pub sentence: String,
+    /// The same where only what matters most is said.
+    #[serde(skip)]
+    pub brief: String,
 }
 
 /// Blocks under a heading.
@@ -178,7 +185,14 @@ impl Table {
 
 impl Conclusion {
     pub fn new(verdict: Verdict, sentence: impl Into<String>) -> Conclusion {
-        Conclusion { word: verdict.word().into(), sentence: sentence.into() }
+        let sentence = sentence.into();
+        Conclusion { word: verdict.word().into(), brief: sentence.clone(), sentence }
+    }
+
+    /// With what matters most.
+    #[must_use]
+    pub fn brief(self, brief: impl Into<String>) -> Conclusion {
+        Conclusion { brief: brief.into(), ..self }
     }
 }
 

@@ -1,6 +1,6 @@
 //! A report as text for a terminal of a given width, or for a file, which takes lines of any length.
 
-use super::{Align, Block, Column, Importance, Level, Report, Table};
+use super::{Align, Block, Column, Importance, Level, Report, Section, Table};
 
 /// Between columns.
 const GAP: usize = 2;
@@ -9,41 +9,12 @@ const NARROWEST: usize = 24;
 /// Before the items of a list, and before what a wrapped item goes on with.
 const INDENT: &str = "  ";
 
-/// All of the report down to `level`, the verdict last. `width`: characters in a line, where there is a limit.
-pub fn text(report: &Report<'_>, level: Level, width: Option<usize>) -> String {
+/// All sections of the report but what the page alone has, the verdict last. `width`: characters in a line, where
+/// there is a limit.
+pub fn full(report: &Report<'_>, width: Option<usize>) -> String {
     let width = width.unwrap_or(usize::MAX);
     let mut out = String::new();
-    for section in &report.sections {
-        let shown = section.blocks.iter().filter(|shown| shown.level <= level).map(|shown| &shown.block);
-        let mut blocks = shown.filter(|block| !matches!(block, Block::Figures { .. })).peekable();
-        if blocks.peek().is_none() {
-            continue;
-        }
-        apart(&mut out);
-        let mut first = true;
-        if section.level <= level && !section.heading.is_empty() {
-            wrap(&mut out, &section.heading, "", width);
-        }
-        for block in blocks {
-            match block {
-                Block::Text { lines, list: false } => lines.iter().for_each(|line| wrap(&mut out, line, "", width)),
-                Block::Text { lines, list: true } => lines.iter().for_each(|line| wrap(&mut out, line, INDENT, width)),
-                Block::Findings { word, items } => {
-                    items.iter().for_each(|item| wrap(&mut out, &format!("{word}: {item}"), "", width));
-                }
-                Block::Command { purpose, command } => out.push_str(&format!("{purpose}: {command}\n")),
-                Block::Table(table) => {
-                    if !table.caption.is_empty() && !first {
-                        apart(&mut out);
-                    }
-                    wrap(&mut out, &table.caption, "", width);
-                    out.push_str(&rows(table, width));
-                }
-                Block::Figures { .. } => {}
-            }
-            first = false;
-        }
-    }
+    report.sections.iter().for_each(|part| section(&mut out, part, width));
     if let Some(verdict) = &report.verdict {
         apart(&mut out);
         wrap(&mut out, &format!("{}: {}", verdict.word, verdict.sentence), "", width);
@@ -55,6 +26,72 @@ pub fn text(report: &Report<'_>, level: Level, width: Option<usize>) -> String {
     out
 }
 
+/// The verdict or the heading, the answer, what was written and what comes next. `ending`: behind the verdict's word.
+pub fn brief(report: &Report<'_>, ending: &str, width: usize) -> String {
+    let mut out = String::new();
+    if report.verdict.is_some() {
+        first_line(report, ending).iter().for_each(|line| wrap(&mut out, line, "", width));
+    }
+    let answered = !report.answer.blocks.is_empty();
+    match answered {
+        true => section(&mut out, &report.answer, width),
+        // what is short has no shorter answer
+        false => report.sections.iter().for_each(|part| section(&mut out, part, width)),
+    }
+    let next = report.next.as_ref().map(|next| format!("next: {next}"));
+    let mut last: Vec<String> = report.written.iter().cloned().chain(next).collect();
+    if answered && !report.sections.is_empty() {
+        last.push("(-v: all tables)".into());
+    }
+    if !last.is_empty() {
+        apart(&mut out);
+        let one = last.join("    ");
+        let lines = if one.chars().count() <= width { vec![one] } else { last };
+        lines.iter().for_each(|line| wrap(&mut out, line, "", width));
+    }
+    out
+}
+
+/// The verdict with its sentence; where nothing is judged, what the answer is about.
+pub fn first_line(report: &Report<'_>, ending: &str) -> Option<String> {
+    match &report.verdict {
+        Some(verdict) => Some(format!("{}{ending}: {}", verdict.word.to_uppercase(), verdict.brief)),
+        None => Some(report.answer.heading.clone()).filter(|heading| !heading.is_empty()),
+    }
+}
+
+fn section(out: &mut String, section: &Section<'_>, width: usize) {
+    let shown = section.blocks.iter().filter(|shown| shown.level < Level::Page).map(|shown| &shown.block);
+    let mut blocks = shown.filter(|block| !matches!(block, Block::Figures { .. })).peekable();
+    if blocks.peek().is_none() {
+        return;
+    }
+    apart(out);
+    let mut first = true;
+    if section.level < Level::Page && !section.heading.is_empty() {
+        wrap(out, &section.heading, "", width);
+    }
+    for block in blocks {
+        match block {
+            Block::Text { lines, list: false } => lines.iter().for_each(|line| wrap(out, line, "", width)),
+            Block::Text { lines, list: true } => lines.iter().for_each(|line| wrap(out, line, INDENT, width)),
+            Block::Findings { word, items } => {
+                items.iter().for_each(|item| wrap(out, &format!("{word}: {item}"), "", width));
+            }
+            Block::Command { purpose, command } => out.push_str(&format!("{purpose}: {command}\n")),
+            Block::Table(table) => {
+                if !table.caption.is_empty() && !first {
+                    apart(out);
+                }
+                wrap(out, &table.caption, "", width);
+                out.push_str(&rows(table, width));
+            }
+            Block::Figures { .. } => {}
+        }
+        first = false;
+    }
+}
+
 /// An empty line, but not at the beginning.
 fn apart(out: &mut String) {
     if !out.is_empty() {
@@ -63,7 +100,7 @@ fn apart(out: &mut String) {
 }
 
 /// Lines of at most `width` characters, broken between words. A word that is longer stays whole.
-fn broken(text: &str, width: usize) -> Vec<String> {
+pub fn broken(text: &str, width: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for paragraph in text.lines() {
         let mut words = paragraph.split(' ');

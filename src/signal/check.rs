@@ -434,7 +434,8 @@ fn time_notes(timing: &Timing, stamps: &Stamps, rate_hz: f64, rows: u64) -> Vec<
     let mut notes = Vec::new();
     if !timing.usable {
         let message = format!(
-            "the steps of the time stamps are too uneven for the sensor's clock (longest {} s, mean {} s): their mean rate {} Hz is used, and gaps cannot be seen",
+            "the steps of the time stamps are too uneven for the sensor's clock (longest {} s, mean {} s): their mean \
+             rate {} Hz is used, and gaps cannot be seen",
             short(stamps.longest),
             short(timing.period),
             short(rate_hz)
@@ -466,7 +467,8 @@ fn time_notes(timing: &Timing, stamps: &Stamps, rate_hz: f64, rows: u64) -> Vec<
     let span = rows as f64 * timing.period;
     if rate_hz > FASTEST || span < SHORTEST {
         let message = format!(
-            "the time stamps say {} Hz over {} s: is the unit of the time column right? `time` NAME:UNIT says another where the header has none, `rate` HZ takes the place of the stamps",
+            "the time stamps say {} Hz over {} s: is the unit of the time column right? `time` NAME:UNIT says another \
+             where the header has none, `rate` HZ takes the place of the stamps",
             short(rate_hz),
             short(span)
         );

@@ -56,12 +56,14 @@ impl Flight {
         let (gravity, accelerometer) = match &design.plant {
             PlantEntry::Static => return Ok(None),
             PlantEntry::Custom(_) => {
-                let message = "the design is a custom plant: simulate moves the plants angle, rate and vertical; leave the design out with \
+                let message = "the design is a custom plant: simulate moves the plants angle, rate and vertical; leave \
+                               the design out with \
                                `plant` static, or judge the filter with montecarlo";
                 return Err(SimulateError(message.into()));
             }
             PlantEntry::Attitude(_) => {
-                let message = "the design is the plant attitude: simulate moves the plants angle, rate and vertical; leave the design out with \
+                let message = "the design is the plant attitude: simulate moves the plants angle, rate and vertical; \
+                               leave the design out with \
                                `plant` static";
                 return Err(SimulateError(message.into()));
             }

@@ -102,7 +102,8 @@ pub fn tune_attitude(params: &Params, design: &Design, flicker_horizon_s: f64) -
     };
     let at_rest = predicted(&model);
     let mut tuning = json!({
-        "method": "the documented noise terms, discretised exactly, and stated figures of motion and heading; nothing is fitted",
+        "method": "the documented noise terms, discretised exactly, and stated figures of motion and heading; nothing \
+                   is fitted",
         "decisions": warnings,
     });
     super::record_check(params, &mut tuning);
@@ -176,7 +177,8 @@ fn force_bias(entry: &AttitudeEntry, force: &LinearModel) -> f64 {
 fn bias_of(entry: &AttitudeEntry, force: &LinearModel) -> Option<String> {
     entry.accelerometer.turn_on_bias.is_none().then(|| {
         format!(
-            "accelerometer: no turn-on bias is given, its spread is taken as {} m/s^2; give turn_on_bias.std_dev if you know it",
+            "accelerometer: no turn-on bias is given, its spread is taken as {} m/s^2; give turn_on_bias.std_dev if \
+             you know it",
             digits(force_bias(entry, force))
         )
     })
@@ -199,7 +201,8 @@ fn heading(aids: &[AidEntry], warnings: &mut Vec<String>) -> Result<Option<Headi
     let (disturbance, correlation_time) = drift.unwrap_or((std_dev, HEADING_TIME));
     if drift.is_none() {
         warnings.push(format!(
-            "{}: no disturbance is given, it is taken to be as large as its white noise, over {HEADING_TIME} s; a magnetic heading is never \
+            "{}: no disturbance is given, it is taken to be as large as its white noise, over {HEADING_TIME} s; a \
+             magnetic heading is never \
              only white: \"{0}: 3 deg, 3 deg over 1 s\"",
             aid.name
         ));

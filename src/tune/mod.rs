@@ -57,7 +57,8 @@ impl Default for TuneOptions {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum TuneError {
     #[error(
-        "axis '{axis}': no measurement noise: the parameters have no 'white' density, so the best filter would follow every sample; \
+        "axis '{axis}': no measurement noise: the parameters have no 'white' density, so the best filter would follow \
+         every sample; \
          give axes[].white.density (its unit is like deg/s/sqrt(Hz))"
     )]
     NoMeasurementNoise { axis: String },
@@ -162,8 +163,13 @@ pub fn tune(params: &Params, options: &TuneOptions) -> Result<Tuned, TuneError> 
 
 /// Key of the record of the tuning: what check the log behind the parameters has failed.
 pub const FAILED_CHECK: &str = "failed_check";
+/// Key of the record of the tuning: how the log behind the parameters was read.
+pub const READING: &str = "reading";
 
 fn record_check(params: &Params, tuning: &mut serde_json::Value) {
+    if let Some(reading) = params.source.as_ref().and_then(|source| source.reading.as_ref()) {
+        tuning[READING] = serde_json::to_value(reading).unwrap_or_default();
+    }
     if let Some(failed) = params.failed_check() {
         tuning[FAILED_CHECK] = failed.into();
     }
@@ -194,7 +200,8 @@ fn tune_axis(
     let mut sensor = plant::build(axis, quantity, dt, chosen, options)?;
     if !axis.noise().terms.iter().any(|term| term.kind().is_drift()) {
         sensor.warnings.push(
-            "the parameters have no drift process: the filter averages for ever and its gain tends to zero; a real sensor drifts"
+            "the parameters have no drift process: the filter averages for ever and its gain tends to zero; a real \
+             sensor drifts"
                 .into(),
         );
     }
@@ -245,8 +252,10 @@ fn lost_in_double(model: &LinearModel, quantity: Quantity) -> Option<String> {
     let ratio = model.r[(0, 0)] / prior;
     (ratio < LEAST_VARIANCE_RATIO && prior > 0.0).then(|| {
         format!(
-            "the white noise of a sample is {:.1e} of the drift and turn-on bias before it, less than the {:.1e} that one covariance in \
-             double precision can hold: the first epochs may look inconsistent; from a density of {:.3e} {}/sqrt(Hz) on they do not (a \
+            "the white noise of a sample is {:.1e} of the drift and turn-on bias before it, less than the {:.1e} that \
+             one covariance in \
+             double precision can hold: the first epochs may look inconsistent; from a density of {:.3e} {}/sqrt(Hz) \
+             on they do not (a \
              sensor that rounds has the noise of its step)",
             ratio.sqrt(),
             LEAST_VARIANCE_RATIO.sqrt(),

@@ -192,7 +192,8 @@ fn warn_slow_aids(axis: &AxisParams, parts: &[Part], dt: f64, warnings: &mut Vec
     });
     if let Some(tc) = quickest.min_by(f64::total_cmp).filter(|tc| *tc < interval) {
         warnings.push(format!(
-            "the aid is slower than the drift: a measurement every {} s, a correlation time of {} s; the drift is hardly followed, its \
+            "the aid is slower than the drift: a measurement every {} s, a correlation time of {} s; the drift is \
+             hardly followed, its \
              estimate has decayed before the next one",
             digits(interval),
             digits(tc)

@@ -41,7 +41,8 @@ pub(super) fn build(axis: &AxisParams, quantity: Quantity, dt: f64, horizon_s: f
             let unit = axis.display_unit(quantity);
             let value = digits(unit.from_si(std_dev));
             warnings.push(format!(
-                "no turn-on bias is given: P0 of the bias is {rule}, {value} {unit}; give turn_on_bias.std_dev if you know it"
+                "no turn-on bias is given: P0 of the bias is {rule}, {value} {unit}; give turn_on_bias.std_dev if you \
+                 know it"
             ));
             std_dev
         }
@@ -52,7 +53,8 @@ pub(super) fn build(axis: &AxisParams, quantity: Quantity, dt: f64, horizon_s: f
     let model = share_level(model, &mut warnings);
     if let Some(flicker) = &flicker {
         warnings.push(format!(
-            "flicker has no exact filter: {} Gauss-Markov states stand for it, {} faster ones are part of R (+{:.2} %); the Allan deviation \
+            "flicker has no exact filter: {} Gauss-Markov states stand for it, {} faster ones are part of R (+{:.2} \
+             %); the Allan deviation \
              of the whole is right to {:.2} % for averaging times up to {} s",
             flicker.states,
             flicker.folded,

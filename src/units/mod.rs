@@ -98,6 +98,15 @@ impl Unit {
     ///
     /// `g` is standard gravity, 9.80665 m/s². What can be read in two ways (`deg/s·√Hz`, `G`, `d`) is refused with a
     /// hint.
+    ///
+    /// ```
+    /// use kfdesign::units::Unit;
+    ///
+    /// let walk = Unit::parse("deg/sqrt(h)")?;
+    /// assert!((walk.to_si(60.0) - 1_f64.to_radians()).abs() < 1e-15); // 60 s are √3600
+    /// assert!(Unit::parse("deg/s·√Hz").is_err());
+    /// # Ok::<(), kfdesign::units::UnitError>(())
+    /// ```
     pub fn parse(text: &str) -> Result<Unit, UnitError> {
         parse::unit(text)
     }
@@ -240,8 +249,13 @@ impl fmt::Display for Unit {
     }
 }
 
-/// Four significant digits, plain where readable: 0.0562, 193.9, 1.234e-7.
+/// Four significant digits, plain where readable: 0.05620, 193.9, 1.234e-7.
 pub fn digits(x: f64) -> String {
+    significant(x, 4)
+}
+
+/// So many significant digits, plain where readable.
+pub fn significant(x: f64, count: usize) -> String {
     if !x.is_finite() {
         return x.to_string();
     }
@@ -250,10 +264,11 @@ pub fn digits(x: f64) -> String {
     }
     let exponent = x.abs().log10().floor();
     if (-4.0..6.0).contains(&exponent) {
-        let decimals = (3.0 - exponent).max(0.0) as usize;
+        let decimals = (count as f64 - 1.0 - exponent).max(0.0) as usize;
         format!("{x:.decimals$}")
     } else {
-        format!("{x:.3e}")
+        let decimals = count.saturating_sub(1);
+        format!("{x:.decimals$e}")
     }
 }
 

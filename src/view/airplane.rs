@@ -2,7 +2,7 @@
 
 use crate::aircraft::airframe::check::{AirplaneCheck, SpeedPoint};
 use crate::report::figure::{self, Curve, Lines};
-use crate::report::{Level, Report, Section};
+use crate::report::{Report, Section};
 use crate::units::digits;
 
 pub fn airplane(check: &AirplaneCheck) -> Report<'_> {
@@ -21,8 +21,8 @@ pub fn airplane(check: &AirplaneCheck) -> Report<'_> {
             )
         }
     };
-    let section = Section::new("").at(Level::Brief).paragraph(flight).table("", &["", ""], facts(check));
-    let section = section.findings("warning", check.warnings.clone()).at(Level::Full);
+    let section = Section::new("").paragraph(flight).table("", &["", ""], facts(check));
+    let section = section.findings("warning", check.warnings.clone());
     let angles: Curves = &[("angle of attack", |p| p.alpha.to_degrees()), ("elevator", |p| p.elevator.to_degrees())];
     let drag: Curves = &[("drag", |p| p.drag), ("thrust at full throttle", |p| p.thrust_available)];
     let section = section

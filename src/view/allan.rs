@@ -1,12 +1,58 @@
 //! Allan deviations.
 
-use crate::allan::{AxisCurve, Deviation};
+use super::answer::{self, three};
+use crate::allan::{AllanPoint, AxisCurve, Deviation, NoiseType};
 use crate::noise::NoiseModel;
-use crate::report::{self, Level, Report, Section};
-use crate::units::digits;
+use crate::report::{self, Report, Section};
+use crate::units::{digits, significant};
 
 pub fn allan<'a>(log: &str, axes: &'a [AxisCurve]) -> Report<'a> {
-    Report { title: log.into(), sections: axes.iter().map(of_axis).collect(), ..Report::default() }
+    let sections = axes.iter().map(of_axis).collect();
+    Report { title: log.into(), sections, answer: answer(log, axes), ..Report::default() }
+}
+
+/// The curve of each axis where it is read: at one second, and where it is lowest; which laws it follows.
+fn answer<'a>(log: &str, axes: &[AxisCurve]) -> Section<'a> {
+    let Some(first) = axes.first() else { return Section::default() };
+    let curve = &first.curve;
+    let heading = format!("{log}: {} of {} samples", curve.deviation.name(), curve.samples);
+    let row = |axis: &AxisCurve| {
+        let points: Vec<&AllanPoint> = axis.curve.points.iter().filter(|p| p.deviation > 0.0).collect();
+        let shown = |p: &AllanPoint| three(axis.unit.from_si(p.deviation));
+        let half = |p: &AllanPoint| significant(50.0 * (p.upper - p.lower) / p.deviation, 2);
+        let lowest = points.iter().min_by(|a, b| a.deviation.total_cmp(&b.deviation));
+        [
+            axis.name.clone(),
+            at_one_second(&points).map_or("-".into(), |(deviation, near)| {
+                format!("{} ± {} %", three(axis.unit.from_si(deviation)), half(near))
+            }),
+            lowest.map_or("-".into(), |p| format!("{} at {}", shown(p), answer::time(p.tau_s))),
+            laws(&points),
+        ]
+    };
+    let unit = answer::unit(&first.unit);
+    let header = ["", &format!("at 1 s, {unit}"), "lowest", "law up to"];
+    Section::new(heading).table("", &header, axes.iter().map(row))
+}
+
+/// The deviation at one second, between the points beside it along a power law, and the later of them.
+fn at_one_second<'p>(points: &[&'p AllanPoint]) -> Option<(f64, &'p AllanPoint)> {
+    let later = points.iter().position(|p| p.tau_s >= 1.0)?;
+    let after = points[later];
+    let before = points[later.saturating_sub(1)];
+    if before.tau_s > 1.0 {
+        return None;
+    }
+    let width = (after.tau_s / before.tau_s).ln();
+    let share = if width > 0.0 { (1.0 / before.tau_s).ln() / width } else { 0.0 };
+    Some((before.deviation * (after.deviation / before.deviation).powf(share), after))
+}
+
+/// "white 10.2 s, flicker 41 s": up to which averaging time each law holds.
+fn laws(points: &[&AllanPoint]) -> String {
+    let known: Vec<&&AllanPoint> = points.iter().filter(|p| p.noise != NoiseType::Unknown).collect();
+    let runs = known.chunk_by(|a, b| a.noise == b.noise).filter_map(|run| run.last());
+    runs.map(|p| format!("{} {}", p.noise.name(), answer::time(p.tau_s))).collect::<Vec<_>>().join(", ")
 }
 
 fn of_axis(axis: &AxisCurve) -> Section<'_> {
@@ -29,12 +75,9 @@ fn of_axis(axis: &AxisCurve) -> Section<'_> {
         [digits(p.tau_s), deviation, lower, upper, digits(p.edf), p.terms.to_string(), p.noise.name().into()]
     });
     Section::new("")
-        .at(Level::Brief)
         .paragraph(format!("{name}: {} of {windows}{} samples", curve.deviation.name(), curve.samples))
-        .at(Level::Full)
         .table("", &["tau (s)", &format!("deviation ({unit})"), "95 % from", "to", "edf", "terms", "noise"], rows)
         .minor(&["edf", "terms"])
-        .at(Level::Brief)
         .paragraph(format!("{lowest}Intervals: {basis}."))
         .figure("", || figure(axis))
 }

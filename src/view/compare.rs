@@ -1,9 +1,11 @@
 //! A noise model held against a log.
 
+use super::answer::{self, three};
 use super::{by_name, or_dash, provenance, verdict};
 use crate::compare::{AxisComparison, Band, Beside, Comparison};
+use crate::consistency::TestKind;
 use crate::report::figure::{self, SpectrumRatio};
-use crate::report::{self, Conclusion, Level, Report, Section};
+use crate::report::{self, Level, Report, Section};
 use crate::units::{Unit, digits};
 
 /// `unit`: of the log.
@@ -41,7 +43,8 @@ pub fn compare<'a>(result: &'a Comparison, unit: &'a Unit) -> Report<'a> {
     Report {
         title: format!("{} against {}", given(&result.log), given(&result.params)),
         subtitle: "A noise model held against a log: does it fit?".into(),
-        verdict: Some(Conclusion::new(result.verdict, result.meaning.clone())),
+        verdict: Some(answer::conclusion(result.verdict, &result.meaning, &result.tests)),
+        answer: answer(result, unit),
         provenance: provenance([
             ("parameters", given(&result.params)),
             ("log", given(&result.log)),
@@ -52,6 +55,26 @@ pub fn compare<'a>(result: &'a Comparison, unit: &'a Unit) -> Report<'a> {
         sections,
         ..Report::default()
     }
+}
+
+fn answer<'a>(result: &Comparison, unit: &Unit) -> Section<'a> {
+    let axes = &result.axes;
+    let row = |axis: &AxisComparison| {
+        let tests = || result.tests.iter().filter(|test| test.axis == axis.name);
+        let nis = tests().find(|test| test.kind == TestKind::Nis).map_or("-".into(), |test| three(test.statistic));
+        let mean = three(unit.from_si(axis.means.real));
+        [axis.name.clone(), axis.samples.to_string(), nis, mean, answer::result(tests())]
+    };
+    let mean = format!("mean ({unit})");
+    let outside = result
+        .parameters
+        .iter()
+        .filter(|beside| !beside.inside.unwrap_or(true))
+        .map(|beside| format!("{}.", beside.meaning));
+    Section::new("")
+        .table("", &["", "samples", "NIS", &mean, "result"], axes.iter().map(row))
+        .paragraphs(outside.take(3).collect())
+        .findings("note", answer::warnings(by_name(axes.iter().map(|a| (a.name.as_str(), a.notes.as_slice())))))
 }
 
 fn number_row(b: &Beside) -> [String; 9] {

@@ -2,7 +2,7 @@
 
 use crate::aircraft::flight::{ColumnReport, FlightReport};
 use crate::report::figure::{self, Curve, Envelope, TimeLines, Track};
-use crate::report::{Level, Report, Section};
+use crate::report::{Report, Section};
 use crate::units::digits;
 
 /// Columns of angles and rates, and the unit in which they are shown.
@@ -39,11 +39,10 @@ pub fn fly<'a>(flown: &FlightReport, header: &[String], lines: Option<&Envelope>
             [one, .., last] => format!("{one} … {last}: "),
         };
         let runs = if flown.runs.len() == 1 { String::new() } else { format!("{} runs of ", flown.runs.len()) };
-        section =
-            section.table("", &["", "mean", "std dev", "least", "greatest"], rows).at(Level::Brief).paragraph(format!(
-                "{files}{runs}{} s of {}, {} rows every {} s, steps of {} s, seed {}.",
-                flown.duration_s, flown.airplane, first.rows, flown.every_s, flown.step_s, flown.seed
-            ));
+        section = section.table("", &["", "mean", "std dev", "least", "greatest"], rows).paragraph(format!(
+            "{files}{runs}{} s of {}, {} rows every {} s, steps of {} s, seed {}.",
+            flown.duration_s, flown.airplane, first.rows, flown.every_s, flown.step_s, flown.seed
+        ));
     }
     let drawn = lines.map_or_else(Vec::new, |lines| figures(header, lines, stops));
     section = drawn.into_iter().fold(section, |section, svg| section.figure("", move || svg.clone()));

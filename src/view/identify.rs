@@ -1,12 +1,13 @@
 //! The noise of a log.
 
-use super::{allan, or_dash, parameters, provenance};
+use super::answer::{self, three};
+use super::{allan, by_name, or_dash, parameters, provenance};
 use crate::identify::graphical::Step;
 use crate::identify::temperature::SMOOTHING_S;
-use crate::identify::{Candidate, IdentifiedAxis, OnTemperature, SharedTime};
-use crate::params::{Measured, NotIdentified, Params};
-use crate::report::{Level, Report, Section};
-use crate::units::{digits, duration};
+use crate::identify::{Candidate, Identified, IdentifiedAxis, OnTemperature, SharedTime};
+use crate::params::{AxisParams, Measured, NotIdentified, Params, TermEntry};
+use crate::report::{Report, Section};
+use crate::units::{Quantity, Unit, digits, duration, significant};
 
 /// Below this p-value the axes have different correlation times.
 const SAME_TIME: f64 = 0.01;
@@ -39,20 +40,127 @@ pub fn identify<'a>(params: &Params, axes: &'a [IdentifiedAxis], shared: Option<
             ("method", source.method.unwrap_or_default()),
         ]),
         sections,
+        answer: answer(params, axes),
         ..Report::default()
     }
 }
 
+/// What is known of each axis, how good the sensor is, and what the log does not tell.
+fn answer<'a>(params: &Params, axes: &[IdentifiedAxis]) -> Section<'a> {
+    let source = params.source.clone().unwrap_or_default();
+    let found = || axes.iter().map(|axis| &axis.found);
+    let mut heading = format!(
+        "{}: {} samples, {} Hz",
+        source.log.unwrap_or_default(),
+        source.samples.map_or("-".into(), |n| n.to_string()),
+        three(params.sample_rate_hz)
+    );
+    heading.extend(source.span_s.map(|span| format!(", {}", answer::time(span))));
+    let mut section = Section::new(heading);
+    match params.failed_check() {
+        Some(failed) => section = section.paragraph(format!("CHECK FAILED (exit 1): {failed}")),
+        None => section.heading += ", at rest",
+    }
+    let Some(bias) = params.axes.first().map(|axis| axis.display_unit(params.quantity)) else { return section };
+    let density = bias.times_time(1);
+    let row = |found: &Identified| {
+        let white = Some(found.model.wideband_density()).filter(|density| *density > 0.0);
+        let precise = found.precision.iter().find(|p| p.parameter == "white.density");
+        [
+            found.params.name.clone(),
+            or_dash_three(white.map(|si| density.from_si(si))),
+            precise.map_or("-".into(), |p| format!("{} %", significant(p.std_dev_percent, 2))),
+            or_dash_three(found.params.bias.as_ref().map(|value| bias.from_si(value.si()))),
+            drift(&found.params),
+        ]
+    };
+    let [of_white, of_bias] = [&density, &bias].map(answer::unit);
+    let header = ["", &format!("N, {of_white}"), "±", &format!("bias, {of_bias}"), "drift"];
+    let named = |found: &Identified, said: Vec<String>| match said.is_empty() {
+        true => None,
+        false => Some(format!("{} {}", found.params.name, said.join(", "))),
+    };
+    let joined = |said: Vec<String>| if said.is_empty() { None } else { Some(said.join("; ")) };
+    let needed = found().flat_map(|f| &f.not_identified).filter_map(|entry| entry.needed_log_s).reduce(f64::max);
+    let needed = needed.map_or_else(String::new, |s| format!(" (about {} would tell)", answer::time(s)));
+    let unknown = joined(found().filter_map(|f| named(f, unknown(f))).collect());
+    let unknown = unknown.map(|terms| answer::cut(&format!("Not told by this log: {terms}")) + &needed + ".");
+    let lines = joined(found().filter_map(|f| named(f, lines(&f.params))).collect());
+    let lines = lines.map(|lines| answer::cut(&format!("Lines (vibration, interference): {lines}")) + ".");
+    section
+        .table("", &header, found().map(row))
+        .paragraphs(grade(params, axes).into_iter().chain(unknown).chain(lines).collect())
+        .findings("warning", answer::warnings(by_name(found().map(|f| (f.params.name.as_str(), &*f.warnings)))))
+}
+
+fn or_dash_three(value: Option<f64>) -> String {
+    value.map_or_else(|| "-".into(), three)
+}
+
+/// Slow terms in words: "0.0281 deg/s over 194 s".
+fn drift(params: &AxisParams) -> String {
+    let shown = |value: &Measured| format!("{} {}", three(value.value), answer::unit(&value.unit));
+    let term = |term: &TermEntry| match term {
+        TermEntry::GaussMarkov { std_dev, correlation_time } => {
+            Some(format!("{} over {} s", shown(std_dev), three(correlation_time.si())))
+        }
+        TermEntry::RateRandomWalk { density } => Some(format!("K {}", shown(density))),
+        TermEntry::BiasInstability { coefficient } => Some(format!("flicker {}", shown(coefficient))),
+        TermEntry::RateRamp { slope } => Some(format!("ramp {}", shown(slope))),
+        _ => None,
+    };
+    let terms: Vec<String> = params.terms.iter().filter_map(term).collect();
+    if !terms.is_empty() {
+        return terms.join(" + ");
+    }
+    let limit = params.not_identified.iter().find_map(|entry| entry.upper_limit.as_ref());
+    limit.map_or("none seen".into(), |limit| format!("none seen (K < {})", shown(limit)))
+}
+
+/// What the log does not tell.
+fn unknown(found: &Identified) -> Vec<String> {
+    found.not_identified.iter().map(|entry| entry.term.clone()).collect()
+}
+
+/// Lines of a spectrum.
+fn lines(params: &AxisParams) -> Vec<String> {
+    let line = |term: &TermEntry| match term {
+        TermEntry::Oscillation { frequency, .. } => Some(format!("{} {}", three(frequency.value), frequency.unit)),
+        _ => None,
+    };
+    params.terms.iter().filter_map(line).collect()
+}
+
+/// Classes of gyros by angle random walk, deg/√h: Yazdi, Ayazi and Najafi, Micromachined inertial sensors, Proc. IEEE
+/// 86(8), 1998, table 1: rate above 0.5, tactical 0.05 to 0.5, inertial below 0.001.
+const GRADES: [(f64, &str); 3] = [
+    (0.5, "rate grade, consumer or industrial"),
+    (0.05, "tactical grade"),
+    (0.001, "between tactical and inertial grade"),
+];
+
+/// How good the gyro is, by the worst of its axes.
+fn grade(params: &Params, axes: &[IdentifiedAxis]) -> Option<String> {
+    let unit = Unit::parse("deg/sqrt(h)").ok().filter(|_| params.quantity == Quantity::AngularRate)?;
+    let walk = axes.iter().map(|axis| axis.found.model.wideband_density()).reduce(f64::max)?;
+    let walk = unit.from_si(walk);
+    let grade = GRADES.iter().find(|(above, _)| walk > *above).map_or("inertial grade", |(_, grade)| grade);
+    Some(format!(
+        "Angle random walk {} deg/√h: {grade} (rate above 0.5, tactical 0.05 to 0.5, inertial below 0.001; \
+         Yazdi, Ayazi, Najafi 1998).",
+        three(walk)
+    ))
+}
+
 fn of_axis<'a>(axis: &'a IdentifiedAxis, params: &Params) -> Section<'a> {
     let found = &axis.found;
-    let section = Section::of_page(found.params.name.clone()).at(Level::Brief).paragraph(headline(axis));
+    let section = Section::of_page(found.params.name.clone()).paragraph(headline(axis));
     let section = parameters::table(section, found, params.quantity)
-        .at(Level::Full)
         .figure("The measured curve with exact 95 % intervals for the model, and the model's terms.", || {
             allan::figure(&axis.measured)
         });
     let section = match &found.hold {
-        Some(hold) => section.at(Level::Brief).paragraph(hold.sentence()).at(Level::Full),
+        Some(hold) => section.paragraph(hold.sentence()),
         None => section,
     };
     let mut section = candidates(section, &found.candidates);

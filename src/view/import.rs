@@ -4,16 +4,17 @@ use super::alike;
 use super::parameters::term_rows;
 use crate::import::Imported;
 use crate::params::{AxisParams, Params};
-use crate::report::{Level, Report, Section};
+use crate::report::{Report, Section};
 use crate::units::digits;
 
 pub fn import<'a>(found: &Imported) -> Report<'a> {
     let rates: Vec<String> =
         found.sensors.iter().map(|p| format!("{} at {} Hz", p.quantity.name(), digits(p.sample_rate_hz))).collect();
-    let parameters = Section::new("")
-        .at(Level::Brief)
-        .paragraph(format!("{}: {}", found.origin, rates.join(", ")))
-        .table("", &["axis", "parameter", "value", "unit", "also"], found.sensors.iter().flat_map(rows));
+    let parameters = Section::new("").paragraph(format!("{}: {}", found.origin, rates.join(", "))).table(
+        "",
+        &["axis", "parameter", "value", "unit", "also"],
+        found.sensors.iter().flat_map(rows),
+    );
     let rules = Section::new("").paragraphs(found.rules.iter().map(|rule| format!("{rule}.")).collect());
     Report { title: found.origin.to_string(), sections: vec![parameters, rules], ..Report::default() }
 }

@@ -2,7 +2,7 @@
 
 use super::or_dash;
 use crate::input::inspect::{ColumnInfo, Inventory, TopicInfo};
-use crate::report::{Level, Report, Section};
+use crate::report::{Report, Section};
 use crate::units::{Quantity, Unit, duration};
 
 /// `all`: every topic with its columns, not only those with a gyro or an accelerometer.
@@ -25,10 +25,8 @@ pub fn info<'a>(name: &str, found: &Inventory, all: bool) -> Report<'a> {
     });
     let plural = if count == 1 { "" } else { "s" };
     let section = Section::new("")
-        .at(Level::Brief)
         .paragraph(format!("{name}: {}, {count} topic{plural}", found.file))
         .table("", &["topic", "rows", "rate (Hz)", "span"], rows)
-        .at(Level::Full)
         .paragraphs(topics.map(columns).collect())
         .findings("note", notes.collect());
     Report { title: name.into(), sections: vec![section], ..Report::default() }

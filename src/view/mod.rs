@@ -5,6 +5,7 @@
 
 pub mod airplane;
 pub mod allan;
+mod answer;
 pub mod compare;
 pub mod export;
 pub mod fly;

@@ -3,7 +3,7 @@
 use super::or_dash;
 use crate::identify::log_plan::{AxisPlan, HOURS, LogPlan, RatePlan};
 use crate::identify::plan::Thinning;
-use crate::report::{Level, Report, Section};
+use crate::report::{Report, Section};
 use crate::units::{digits, duration};
 
 /// Axes alike are shown once.
@@ -24,10 +24,19 @@ pub fn plan<'a>(plan: &LogPlan) -> Report<'a> {
         .map(String::from)
         .to_vec(),
     ));
-    Report { title: format!("A log for {}", plan.parameter), sections, ..Report::default() }
+    let alike = plan.axes.chunk_by(|a, b| a.model == b.model);
+    let answers = alike.map(|alike| {
+        let names: Vec<&str> = alike.iter().map(|axis| axis.name.as_str()).collect();
+        let best =
+            alike[0].recommended.as_ref().map(|best| format!("; lowest rate for at most 5 % more: {}", advice(best)));
+        answer(plan, &alike[0], &names.join(", ")) + &best.unwrap_or_default()
+    });
+    let short = Section::new("").paragraphs(answers.collect());
+    Report { title: format!("A log for {}", plan.parameter), sections, answer: short, ..Report::default() }
 }
 
-fn of_axis<'a>(plan: &LogPlan, axis: &AxisPlan, names: &str) -> Section<'a> {
+/// How long a log must be.
+fn answer(plan: &LogPlan, axis: &AxisPlan, names: &str) -> String {
     let wish = format!("{} %", digits(100.0 * plan.precision));
     let value = axis.value.as_ref().map_or_else(String::new, |value| format!(" ({value})"));
     let rate = digits(plan.sample_rate_hz);
@@ -41,8 +50,11 @@ fn of_axis<'a>(plan: &LogPlan, axis: &AxisPlan, names: &str) -> Section<'a> {
              parameters"
         ),
     };
-    let answer = format!("{names}: {}{value} to {wish}: {needed}", plan.parameter);
-    let mut section = Section::new("").at(Level::Brief).paragraph(answer).at(Level::Full).table(
+    format!("{names}: {}{value} to {wish}: {needed}", plan.parameter)
+}
+
+fn of_axis<'a>(plan: &LogPlan, axis: &AxisPlan, names: &str) -> Section<'a> {
+    let mut section = Section::new("").paragraph(answer(plan, axis, names)).table(
         "At other rates",
         &["rate (Hz)", "samples", "length", "against own rate"],
         axis.rates.iter().map(rate_row),

@@ -1,6 +1,6 @@
 //! What was simulated.
 
-use crate::report::{Level, Report, Section};
+use crate::report::{Report, Section};
 use crate::simulate::Summary;
 use crate::units::digits;
 
@@ -20,9 +20,6 @@ pub fn simulate<'a>(summary: &Summary) -> Report<'a> {
         summary.seed,
         summary.run
     );
-    let section = Section::new("")
-        .table("", &["axis", &bias, &mean, &sigma, "saturated"], rows)
-        .at(Level::Brief)
-        .paragraph(sentence);
+    let section = Section::new("").table("", &["axis", &bias, &mean, &sigma, "saturated"], rows).paragraph(sentence);
     Report { title: summary.log.clone(), sections: vec![section], ..Report::default() }
 }

@@ -27,7 +27,7 @@ pub fn trim<'a>(linearized: &'a Linearized, document: &'a LinearDocument) -> Rep
         provenance: vec![("version".into(), document.version.into())],
         sections: vec![
             Section::of_page("Steady flight")
-                .at(Level::Brief)
+                .at(Level::Full)
                 .paragraphs(headline(document))
                 .at(Level::Page)
                 .table("", &["", "value"], state(document))
@@ -65,8 +65,18 @@ pub fn trim<'a>(linearized: &'a Linearized, document: &'a LinearDocument) -> Rep
                     gramians,
                 ),
         ],
+        answer: answer(document),
         ..Report::default()
     }
+}
+
+/// Where it flies, its modes, and what to be careful of.
+fn answer<'a>(document: &LinearDocument) -> Section<'a> {
+    let modes = document.modes.iter().filter(|m| m.model != "full").map(mode_row);
+    Section::new("")
+        .paragraphs(headline(document))
+        .table("", &["mode", "eigenvalue (1/s)", "frequency (rad/s)", "damping", "time (s)"], modes)
+        .findings("warning", document.warnings.clone())
 }
 
 /// Where and how it flies, and what holds it there.

@@ -29,7 +29,7 @@ fn filters_that_cannot_become_code() {
         row("export filter.json --to c -o 2fast.c", &["'2fast'", "small letters"]),
         row("export filter.json --to rust -o static.rs", &["'static'", "no word of C"]),
         row("export filter.json --to c -o float.c", &["'float'"]),
-        row("export filter.json --to c -o no/such/drift.c", &["no/such/drift.h: cannot write"]),
+        row("export filter.json --to c -o no/such/drift.c", &["no/such/drift.c: cannot write"]),
         row("export filter.json --to c -o drift.c --axis w", &["--axis w: the axes are x"]),
         row("export filter.json --to c -o drift.c --inflate 2", &["--inflate is for noise parameters"]),
         row("export filter.json --to c -o drift.c --walk short", &["--walk is for noise parameters"]),

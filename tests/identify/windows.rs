@@ -166,7 +166,7 @@ fn what_has_no_windows() {
     for (flags, expected) in [
         ("--method allan", "--window 10s: only --method likelihood is identified in windows"),
         ("log.csv", "--window 10s: only one log is identified in windows"),
-        ("--robust", "--window 10s: only a log without --robust is identified in windows"),
+        ("--without-outliers", "--window 10s: only a log without --without-outliers is identified in windows"),
         ("--temperature t", "--window 10s: only a log without --temperature is identified in windows"),
     ] {
         let out = bench.run(&format!("identify log.csv --rate 10 --window 10s {flags} -o params.json"));

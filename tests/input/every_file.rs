@@ -1,4 +1,4 @@
-//! Every measured file that is at hand is read or refused as the table in docs/validation.md says, and the table has
+//! Every measured file that is at hand is read or refused as the table in docs/validation/reading.md says, and the table has
 //! all of them.
 
 use std::collections::BTreeSet;
@@ -38,7 +38,8 @@ fn flags(text: &str) -> Vec<(String, String)> {
 }
 
 fn table() -> Vec<Row> {
-    let page = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/validation.md")).unwrap();
+    let page =
+        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/validation/reading.md")).unwrap();
     let rows =
         page.lines().filter(|line| ["| formats/", "| static/", "| motion/"].iter().any(|row| line.starts_with(row)));
     rows.map(|line| {
@@ -115,6 +116,6 @@ fn every_measured_file_is_read_or_refused_as_the_table_says() {
     let mut there = BTreeSet::new();
     ["formats", "static", "motion"].iter().for_each(|folder| files(root, &root.join(folder), &mut there));
     let named: BTreeSet<String> = rows.iter().map(|row| row.file.clone()).collect();
-    assert_eq!(named, there, "the table in docs/validation.md and the folder differ");
+    assert_eq!(named, there, "the table in docs/validation/reading.md and the folder differ");
     rows.par_iter().for_each(|row| row.check(&root.join(&row.file)));
 }

@@ -38,9 +38,9 @@ fn mat(variable: impl FnOnce(&mut dyn Write)) -> Vec<u8> {
     file
 }
 
-/// The same with so many objects, each with names as long as they may be.
-fn objects(count: usize) -> Vec<u8> {
-    let name = vec![b'o'; 1000];
+/// The same with so many objects, each with names of this length.
+fn objects(count: usize, length: usize) -> Vec<u8> {
+    let name = vec![b'o'; length];
     let parts = [element(6, &[17, 0, 0, 0, 0, 0, 0, 0]), element(1, &name), element(1, b"MCOS"), element(1, &name)];
     let one = mat(|out| out.write_all(&element(14, &parts.concat())).unwrap());
     let (head, object) = one.split_at(128);
@@ -246,7 +246,7 @@ fn files_made_on_purpose_take_no_more_than_others() {
     let wide: Vec<(u8, &[u8])> = [wide, &vec![(b'D', &[0, 0][..]); 100_000]].concat();
     let names = vec![b'a'; 1 << 20];
     let window = [&[0; 16][..], &(1u64 << 40).to_le_bytes(), &[0; 4], b"\x04\0\0\0zstd", &[0; 8]].concat();
-    let files: [(&str, Vec<u8>, &str); 16] = [
+    let files: [(&str, Vec<u8>, &str); 17] = [
         ("repeated.npy", npy("(0,)", &format!("[{fields}]")), ROOM),
         ("long.ulg", ulog(&[(b'F', &long), (b'A', b"\0\0\0q"), (b'D', b"\0\0\x01")]), "a name of 2003 bytes"),
         ("wide.ulg", ulog(&wide), WORK),
@@ -274,7 +274,8 @@ fn files_made_on_purpose_take_no_more_than_others() {
             }),
             WORK,
         ),
-        ("objects.mat", objects(5000), ROOM),
+        ("objects.mat", objects(5000, 1000), ROOM),
+        ("nameless.mat", objects(45_000, 0), ROOM),
         ("shared.h5", shared_block(300), "a block at the address of another"),
         ("long.h5", ladder(6, 8, &"N".repeat(1000)), "a name of 2003 bytes"),
         ("ladder.h5", ladder(16, 20, ""), ""),

@@ -24,6 +24,7 @@ pub fn within(path: &std::path::Path, command: &[&str], bytes: usize) -> (Option
         .args(["-c", &format!("ulimit -d {limit}; exec \"$0\" \"$@\""), env!("CARGO_BIN_EXE_kfdesign"), command[0]])
         .arg(path)
         .args(&command[1..])
+        .arg("-v")
         // stacks and heaps come by the thread
         .env("RAYON_NUM_THREADS", "2")
         .env("MALLOC_ARENA_MAX", "2")

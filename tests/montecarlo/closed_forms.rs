@@ -76,7 +76,7 @@ fn errors_are_within_their_sigmas_as_often_as_normal_ones() {
 fn credibility_has_the_size_and_the_sign_of_the_mistake() {
     let bench = bench(SMALL);
     bench.file("truth.json", SMALL);
-    for (factor, word, side) in [(2.0, "too timid", "pessimistic"), (0.5, "too proud", "optimistic")] {
+    for (factor, word, side) in [(2.0, "pessimistic", "pessimistic"), (0.5, "optimistic", "optimistic")] {
         let mut scaled = SMALL.to_string();
         for (name, value, unit) in
             [("std_dev\": \"", 0.5, "deg/s\"}"), ("density\": \"", 0.05, "deg/s/"), ("std_dev\": \"", 0.05, "deg/s\",")]

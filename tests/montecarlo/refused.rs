@@ -137,7 +137,7 @@ fn a_plan_that_names_nothing() {
     // refused before the work, so that a long experiment is not thrown away for a slip of the hand
     let args: Vec<[&str; 8]> = rows
         .iter()
-        .map(|(plan, _)| ["montecarlo", "filter.json", "--duration", "20s", "--runs", "100000000", "--plan", *plan])
+        .map(|(plan, _)| ["montecarlo", "filter.json", "--duration", "20s", "--runs", "100000000", "--runs-for", *plan])
         .collect();
     let words: Vec<[&str; 2]> = rows.iter().map(|(plan, words)| [*plan, *words]).collect();
     let rows: Vec<(&[&str], &[&str])> = args.iter().zip(&words).map(|(args, words)| (&args[..], &words[..])).collect();

@@ -63,7 +63,7 @@ fn outliers_of_an_aid_are_clipped() {
     };
     run("", 1);
     let plain = rms_after(&angles(&bench), &truth, 6000);
-    let robust = run("--robust 3", 0);
+    let robust = run("--clip 3", 0);
     let clipped = rms_after(&angles(&bench), &truth, 6000);
     let rejected = robust["axes"][0]["rejected"].as_u64().unwrap();
     // 30 of 600 expected; Poisson beyond 8 or 62: below 1e-5
@@ -74,8 +74,8 @@ fn outliers_of_an_aid_are_clipped() {
     assert!(clipped < 2.0 * sigma && plain > 2.0 * clipped, "{plain} {clipped} {sigma}");
     // a gate keeps them out too, and its count is judged
     let gated = run("--gate 3", 1);
-    let refused = bench.run(&format!("{RUN} --robust 0.5"));
-    assert!(refused.status == 2 && refused.stderr.contains("robust is 0.5, expected at least 1"), "{}", refused.stderr);
+    let refused = bench.run(&format!("{RUN} --clip 0.5"));
+    assert!(refused.status == 2 && refused.stderr.contains("clip is 0.5, expected at least 1"), "{}", refused.stderr);
     assert!(gated["tests"].as_array().unwrap().iter().any(|t| t["name"] == "rejected" && t["pass"] == false));
 }
 
@@ -92,7 +92,7 @@ fn a_clipped_filter_finds_back_where_a_gate_is_locked_out() {
     };
     assert!(off("--gate 3") > 50.0);
     // five sigma of 0.46 deg, and as much for what is left of the walk
-    assert!(off("--robust 3") < 5.0);
+    assert!(off("--clip 3") < 5.0);
 }
 
 /// The square root gives the numbers of the Joseph form: estimates and sigmas to 1e-8 of a sigma, over a gap and a

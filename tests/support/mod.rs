@@ -53,7 +53,13 @@ impl Bench {
     pub fn run(&self, args: &str) -> Outcome {
         self.run_args(&args.split_whitespace().collect::<Vec<_>>())
     }
+    /// With every table and note, unless the arguments say how much is shown.
     pub fn run_args(&self, args: &[&str]) -> Outcome {
+        let said = args.iter().any(|arg| ["-v", "-q", "--verbose", "--quiet"].contains(arg));
+        self.as_typed(&[args, if said { &[] } else { &["-v"] }].concat())
+    }
+    /// As a person types it.
+    pub fn as_typed(&self, args: &[&str]) -> Outcome {
         let output =
             Command::new(env!("CARGO_BIN_EXE_kfdesign")).args(args).current_dir(self.dir.path()).output().unwrap();
         let stdout = String::from_utf8_lossy(&output.stdout).into_owned();

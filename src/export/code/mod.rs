@@ -122,7 +122,8 @@ pub fn check_name(name: &str) -> Result<(), String> {
         return Ok(());
     }
     Err(format!(
-        "'{name}' becomes the name of types and functions: expected at most 31 small letters, digits and underscores, a letter first, and no word of C, \
+        "'{name}' becomes the name of types and functions: expected at most 31 small letters, digits and underscores, \
+         a letter first, and no word of C, \
          Rust or their libraries"
     ))
 }

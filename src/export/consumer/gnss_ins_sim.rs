@@ -10,7 +10,8 @@ use crate::units::Quantity;
 pub(super) fn write(export: &Export, page: &mut Page) -> Result<(), String> {
     let degree = std::f64::consts::PI / 180.0;
     page.about(&[
-        "gnss-ins-sim: angle random walk deg/sqrt(h), bias stability = sigma of the Gauss-Markov drift in deg/h, its correlation time in s;",
+        "gnss-ins-sim: angle random walk deg/sqrt(h), bias stability = sigma of the Gauss-Markov drift in deg/h, its \
+         correlation time in s;",
         "the simulated drift starts at zero: leave the first two correlation times out",
     ]);
     page.body.push_str("import numpy as np\n\nimu_err = {\n");
@@ -22,7 +23,8 @@ pub(super) fn write(export: &Export, page: &mut Page) -> Result<(), String> {
         let Some(sensor) = export.sensor(quantity) else { continue };
         if sensor.axes.iter().any(|n| n.rate_random_walk > 0.0) {
             return Err(format!(
-                "the {name} has a rate random walk, which gnss-ins-sim does not have (its infinite correlation time is white noise); identify with \
+                "the {name} has a rate random walk, which gnss-ins-sim does not have (its infinite correlation time is \
+                 white noise); identify with \
                  `model` white+gm"
             ));
         }

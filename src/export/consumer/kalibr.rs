@@ -8,7 +8,8 @@ use crate::units::Quantity;
 
 pub(super) fn write(export: &Export, page: &mut Page) -> Result<(), String> {
     page.about(&[
-        "Kalibr imu.yaml: continuous densities; Kalibr itself makes N*sqrt(update_rate) of the white ones and takes the walks as they are",
+        "Kalibr imu.yaml: continuous densities; Kalibr itself makes N*sqrt(update_rate) of the white ones and takes \
+         the walks as they are",
     ]);
     four(export, "", page)?;
     page.body.push_str("rostopic: /imu0\n");

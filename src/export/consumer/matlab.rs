@@ -12,12 +12,14 @@ use crate::units::Quantity;
 pub(super) fn write(export: &Export, page: &mut Page) -> Result<(), String> {
     let dt = 1.0 / export.rate();
     let rate = format!(
-        "the bias-instability filter is for {} Hz; not run in MATLAB by the author of this file: compare once with allanvar",
+        "the bias-instability filter is for {} Hz; not run in MATLAB by the author of this file: compare once with \
+         allanvar",
         export.rate()
     );
     page.mark = "%";
     page.about(&[
-        "MATLAB imuSensor: NoiseType single-sided, so that NoiseDensity is N; with the default, double-sided, it would be N/sqrt(2)",
+        "MATLAB imuSensor: NoiseType single-sided, so that NoiseDensity is N; with the default, double-sided, it would \
+         be N/sqrt(2)",
         &rate,
     ]);
     page.body.push_str(&format!("imu = imuSensor('SampleRate', {});\n", export.rate()));
@@ -32,7 +34,8 @@ pub(super) fn write(export: &Export, page: &mut Page) -> Result<(), String> {
         let white = sensor.three(|n| n.white.value * export.inflation)?;
         let walk = sensor.three(|n| of(&n.name).map_or(0.0, |(_, walk)| walk))?;
         page.body.push_str(&format!(
-            "imu.{property} = {function}('NoiseType', 'single-sided', ...\n    'NoiseDensity', {}, ...\n    'RandomWalk', {}",
+            "imu.{property} = {function}('NoiseType', 'single-sided', ...\n    'NoiseDensity', {}, ...\n    \
+             'RandomWalk', {}",
             row(white),
             row(walk)
         ));
@@ -41,7 +44,8 @@ pub(super) fn write(export: &Export, page: &mut Page) -> Result<(), String> {
             let gain = (-(-2.0 * dt / time).exp_m1()).sqrt();
             let sigma = sensor.three(|n| process(&n.name).map_or(0.0, |p| p.std_dev))?;
             page.body.push_str(&format!(
-                ", ...\n    'BiasInstability', {}, ...\n    'BiasInstabilityCoefficients', struct('Numerator', 1, 'Denominator', [1, {:.13}])",
+                ", ...\n    'BiasInstability', {}, ...\n    'BiasInstabilityCoefficients', struct('Numerator', 1, \
+                 'Denominator', [1, {:.13}])",
                 row(sigma.map(|s| s * gain)),
                 -(-dt / time).exp()
             ));

@@ -248,7 +248,8 @@ impl Numbers {
     pub fn note(&self) -> Option<String> {
         (self.oscillations > 1.1).then(|| {
             format!(
-                "{}: N is {:.2} times that of the white noise alone: it has the density of the oscillations at low frequencies, as behind a low-pass in the sensor",
+                "{}: N is {:.2} times that of the white noise alone: it has the density of the oscillations at low \
+                 frequencies, as behind a low-pass in the sensor",
                 self.name, self.oscillations
             )
         })

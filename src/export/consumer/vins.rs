@@ -10,11 +10,13 @@ use crate::units::Quantity;
 pub(super) fn write(export: &Export, page: &mut Page) -> Result<(), String> {
     let rate = export.rate();
     let line = format!(
-        "so gyr_n = N sqrt(2/dt) (the customary N/sqrt(dt) is sqrt(2) less) and gyr_w = K/sqrt(dt), at {rate} Hz: with another rate they are wrong"
+        "so gyr_n = N sqrt(2/dt) (the customary N/sqrt(dt) is sqrt(2) less) and gyr_w = K/sqrt(dt), at {rate} Hz: with \
+         another rate they are wrong"
     );
     page.first = "%YAML:1.0\n";
     page.about(&[
-        "VINS-Mono / VINS-Fusion: discrete numbers. The code gives an angle step the variance dt^2 gyr_n^2 / 2 and a bias step dt^2 gyr_w^2,",
+        "VINS-Mono / VINS-Fusion: discrete numbers. The code gives an angle step the variance dt^2 gyr_n^2 / 2 and a \
+         bias step dt^2 gyr_w^2,",
         &line,
     ]);
     for (quantity, name) in [(Quantity::SpecificForce, "acc"), (Quantity::AngularRate, "gyr")] {

@@ -101,7 +101,8 @@ impl Export {
                 continue;
             };
             page.details.push(format!(
-                "{}: with this walk the error of the estimated drift is {} times the least possible (NEES {}), in the first minute at most {} times; \
+                "{}: with this walk the error of the estimated drift is {} times the least possible (NEES {}), in the \
+                 first minute at most {} times; \
                  no walk costs less than {}, K = {} {}",
                 axis.name,
                 digits(price.settled),
@@ -120,7 +121,8 @@ impl Export {
             page.price.push(format!("{}; step {} s", self.walk.words(), digits(self.step())));
         }
         let words = format!(
-            "{}: price {} settled, {} in the first minute (error of the drift over the least possible error; {name}), least possible {}; aid: {}",
+            "{}: price {} settled, {} in the first minute (error of the drift over the least possible error; {name}), \
+             least possible {}; aid: {}",
             device(sensor.quantity),
             digits(price.settled),
             digits(price.first_minute),
@@ -130,7 +132,8 @@ impl Export {
         page.price.push(words);
         if price.worst() > DEAR {
             page.warnings.push(format!(
-                "the walk of the {} costs: with it the error of the estimated drift of {name} is {} times the least possible; no walk costs less than {}{}",
+                "the walk of the {} costs: with it the error of the estimated drift of {name} is {} times the least \
+                 possible; no walk costs less than {}{}",
                 device(sensor.quantity),
                 digits(price.worst()),
                 digits(least),
@@ -173,7 +176,8 @@ impl Export {
         }
         if worst > 1.0 {
             page.price.push(format!(
-                "{}: the one Gauss-Markov process whose Allan deviation is nearest the sensor's: within a factor of {} over {} to {} s",
+                "{}: the one Gauss-Markov process whose Allan deviation is nearest the sensor's: within a factor of {} \
+                 over {} to {} s",
                 device(sensor.quantity),
                 digits(worst),
                 digits(self.step()),
@@ -182,7 +186,8 @@ impl Export {
         }
         if worst > DEAR {
             page.warnings.push(format!(
-                "one Gauss-Markov process stands for the drift of the {}: its Allan deviation is off by a factor of up to {}",
+                "one Gauss-Markov process stands for the drift of the {}: its Allan deviation is off by a factor of up \
+                 to {}",
                 device(sensor.quantity),
                 digits(worst)
             ));
@@ -193,7 +198,8 @@ impl Export {
 
 fn no_drift(quantity: Quantity) -> String {
     format!(
-        "the parameters of the {} have no drift and no upper limit of one, and the file needs a number: identify a log at rest of some hours, give \
+        "the parameters of the {} have no drift and no upper limit of one, and the file needs a number: identify a log \
+         at rest of some hours, give \
          rate_random_walk.density, or write zeros with `allow_zero_walk`",
         device(quantity)
     )

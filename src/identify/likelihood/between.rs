@@ -274,7 +274,8 @@ impl Between {
             format!("; the farthest, log {log}, has {} times that of the others", digits(ratio))
         });
         format!(
-            "the logs differ in {} (chi-square {} with {} degrees of freedom, p = {}){which}: its value and interval are those of the mean over logs, \
+            "the logs differ in {} (chi-square {} with {} degrees of freedom, p = {}){which}: its value and interval \
+             are those of the mean over logs, \
              and from one log to the next it moves by {} % (1 sigma; 95 %: {low} … {high} %)",
             self.parameter,
             digits(self.chi_square),

@@ -132,7 +132,9 @@ impl Whole<'_> {
             return Err(failed(if asked(Kind::Oscillation) {
                 "no line stands out of the spectrum: leave osc out of `model`".into()
             } else if asked(Kind::BandLimit) {
-                "every filter of this order would be a line (osc) or drift (gm, flicker, rrw): add that to `model`, take another order, or auto".into()
+                "every filter of this order would be a line (osc) or drift (gm, flicker, rrw): add that to `model`, \
+                 take another order, or auto"
+                    .into()
             } else {
                 format!("{samples} samples say nothing about any noise term; use a longer log")
             }));

@@ -150,7 +150,8 @@ fn add_field(fields: &mut Vec<Field>, offset: u64, name: &str, dtype: &str) -> R
     };
     if code.starts_with('O') {
         return Err(format!(
-            "{of} holds Python objects (a pickle): it is not read, because reading it runs code; save numbers, for example with astype(float)"
+            "{of} holds Python objects (a pickle): it is not read, because reading it runs code; save numbers, for \
+             example with astype(float)"
         ));
     }
     let (letter, size) = code.split_at_checked(1).ok_or_else(not_read)?;

@@ -20,7 +20,7 @@ pub(super) fn axes(
     let other = match () {
         () if request.method != MethodArg::Likelihood => Some("`method` likelihood"),
         () if request.logs.len() > 1 => Some("one log"),
-        () if request.robust => Some("a log without `robust`"),
+        () if request.without_outliers => Some("a log without `without_outliers`"),
         () if request.temperature.as_deref().is_some_and(|column| column.trim() != "none") => {
             Some("a log without `temperature`")
         }

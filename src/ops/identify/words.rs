@@ -14,8 +14,10 @@ pub(super) fn change_words(recent: &Recent, part: &Stretch, dt: f64) -> String {
     let seconds = |samples: usize| digits(samples as f64 * dt);
     let of = if part.left_out > 0 { " of the longest stretch" } else { "" };
     format!(
-        "the noise changes along the log: the last third{of} is told better by the {} s before it than by all {} s before it (ln L +{}); what comes after \
-         the log may be told best from {} s on: see what `start` gives there; drift is then known from less. A filter that finds such noise anew as it runs: replay `follow`",
+        "the noise changes along the log: the last third{of} is told better by the {} s before it than by all {} s \
+         before it (ln L +{}); what comes after \
+         the log may be told best from {} s on: see what `start` gives there; drift is then known from less. A filter \
+         that finds such noise anew as it runs: replay `follow`",
         seconds(recent.part),
         seconds(recent.before),
         digits(recent.gain),
@@ -31,7 +33,8 @@ pub(super) fn upset_words(part: &Stretch, dt: f64, robust: bool) -> Vec<String> 
     let outliers = upsets::outliers(&part.rate);
     if let (Some(first), false) = (outliers.first(), robust) {
         words.push(format!(
-            "outliers: {} of {} samples are farther from their surroundings than noise goes, the first at {} s{of}; `robust` leaves them out, or finds the law whose tails they are",
+            "outliers: {} of {} samples are farther from their surroundings than noise goes, the first at {} s{of}; \
+             `without_outliers` leaves them out, or finds the law whose tails they are",
             outliers.len(),
             part.rate.len(),
             time(*first)
@@ -46,7 +49,8 @@ pub(super) fn upset_words(part: &Stretch, dt: f64, robust: bool) -> Vec<String> 
             format!("{size} {} at {} s ({} sigma)", part.unit.text(), time(step.index), digits(step.sigmas))
         });
         words.push(format!(
-            "the level moves at once: {}{of}; no stationary noise does that, and a model takes it for drift: identify the parts between with `start`/`end`",
+            "the level moves at once: {}{of}; no stationary noise does that, and a model takes it for drift: identify \
+             the parts between with `start`/`end`",
             each.collect::<Vec<_>>().join(", ")
         ));
     }

@@ -79,7 +79,7 @@ pub(super) fn run(request: &Request) -> anyhow::Result<Done> {
         ("innovations", request.innovations),
         ("smooth", request.smooth),
         ("gate", request.gate.is_some()),
-        ("robust", request.robust.is_some()),
+        ("clip", request.clip.is_some()),
         ("follow", request.follow.is_some()),
         ("form", request.form != FormFlag::Joseph),
     ];
@@ -125,7 +125,8 @@ pub(super) fn run(request: &Request) -> anyhow::Result<Done> {
     let mut result = replayer.finish();
     if result.specific_force.samples == 0 {
         bail!(
-            "{name}: no row has a number in all three columns of the accelerometer; without it an attitude cannot be found"
+            "{name}: no row has a number in all three columns of the accelerometer; without it an attitude cannot be \
+             found"
         );
     }
     if request.attitude.reference.is_some() && result.errors.is_none() {
@@ -182,7 +183,8 @@ fn columns(request: &Request, design: &AttitudeDesign) -> anyhow::Result<(Vec<Ex
     )?;
     if let (Some(name), None) = (heading_name, &heading) {
         bail!(
-            "the filter measures {name}; say which columns that is: `aid` {name}=MX,MY,MZ for a field, or `aid` {name}=YAW"
+            "the filter measures {name}; say which columns that is: `aid` {name}=MX,MY,MZ for a field, or `aid` \
+             {name}=YAW"
         );
     }
     let reference = match request.attitude.reference.as_deref() {

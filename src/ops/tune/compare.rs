@@ -43,13 +43,13 @@ pub fn run(request: &Request) -> anyhow::Result<(Ranking, FilterDesign)> {
         request.files.iter().partition(|path| path.extension().is_some_and(|e| e == "json"));
     if designs.is_empty() || logs.is_empty() {
         bail!(
-            "`compare`: found {} designs (.json) and {} logs; expected designs and then at least one log",
+            "`rank`: found {} designs (.json) and {} logs; expected designs and then at least one log",
             designs.len(),
             logs.len()
         );
     }
     let designs = designs.iter().map(|path| design(path, &options)).collect::<anyhow::Result<Vec<_>>>()?;
-    let Some((_, first)) = designs.first().cloned() else { bail!("`compare`: no design") };
+    let Some((_, first)) = designs.first().cloned() else { bail!("`rank`: no design") };
     let mut contest = Contest::new(designs, held_out)?;
     for path in logs {
         let Opened { name, mut reader, shape, .. } = logs_of.open(path, &first)?;

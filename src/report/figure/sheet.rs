@@ -15,7 +15,8 @@ pub fn sheet(title: &str, figures: &[String]) -> String {
         y += height;
     }
     format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"kf\" width=\"{WIDTH}\" height=\"{y}\" viewBox=\"0 0 {WIDTH} {y}\">\n\
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"kf\" width=\"{WIDTH}\" height=\"{y}\" viewBox=\"0 0 {WIDTH} \
+         {y}\">\n\
          <title>{}</title>\n{style}{inner}</svg>\n",
         escape(title)
     )

@@ -157,8 +157,10 @@ pub fn style_sheet() -> String {
 pub(super) fn document(drawn: &str, height: i32, title: &str, description: &str) -> String {
     let (w, h) = (WIDTH * UNITS, height * UNITS);
     let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"kf\" role=\"img\" width=\"{WIDTH}\" height=\"{height}\" viewBox=\"0 0 {w} {h}\">\n\
-         <title>{}</title>\n<desc>{}</desc>\n<style>{}</style>\n<rect class=\"kf-paper\" width=\"{w}\" height=\"{h}\"/>\n",
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"kf\" role=\"img\" width=\"{WIDTH}\" height=\"{height}\" \
+         viewBox=\"0 0 {w} {h}\">\n\
+         <title>{}</title>\n<desc>{}</desc>\n<style>{}</style>\n<rect class=\"kf-paper\" width=\"{w}\" \
+         height=\"{h}\"/>\n",
         escape(title),
         escape(description),
         style_sheet()
@@ -289,7 +291,8 @@ mod tests {
     fn elements_keep_geometry_and_lose_presentation() {
         let line = "polyline fill=\"none\" opacity=\"1\" stroke=\"#000014\" stroke-width=\"1\" points=\"1,2 3,4 \"/>";
         assert_eq!(restyle(line), "<polyline class=\"kf20\" points=\"1,2 3,4\"/>");
-        let text = "text x=\"5\" y=\"6\" dy=\"0.5ex\" text-anchor=\"end\" font-family=\"sans-serif\" font-size=\"98\" opacity=\"1\" fill=\"#000002\">";
+        let text = "text x=\"5\" y=\"6\" dy=\"0.5ex\" text-anchor=\"end\" font-family=\"sans-serif\" font-size=\"98\" \
+                    opacity=\"1\" fill=\"#000002\">";
         assert_eq!(restyle(text), "<text class=\"kf2\" x=\"5\" y=\"6\" dy=\"0.36em\" text-anchor=\"end\">");
     }
 }

@@ -362,7 +362,8 @@ impl AxisCheck {
                 count: samples,
                 first: Some(first),
                 message: format!(
-                    "{samples} samples in {runs} {} of equal values, the longest {longest}; chance explains runs up to {}",
+                    "{samples} samples in {runs} {} of equal values, the longest {longest}; chance explains runs up to \
+                     {}",
                     are(runs, "run", "runs"),
                     shortest - 1.0
                 ),
@@ -382,7 +383,8 @@ impl AxisCheck {
                     count,
                     first: Some(first),
                     message: format!(
-                        "{count} samples stand at the {word} value {value} ({} at the next one): the sensor was at its limit",
+                        "{count} samples stand at the {word} value {value} ({} at the next one): the sensor was at its \
+                         limit",
                         end.inner_count
                     ),
                     serious: true,
@@ -412,7 +414,8 @@ impl AxisCheck {
             count,
             first: Some(first),
             message: format!(
-                "{count} {} more than {OUTLIER} robust standard deviations from the samples around, the furthest by {}; kept",
+                "{count} {} more than {OUTLIER} robust standard deviations from the samples around, the furthest by \
+                 {}; kept",
                 are(count, "sample lies", "samples lie"),
                 self.show(self.largest_outlier)
             ),

@@ -185,7 +185,8 @@ fn sample(
         if rows < first + LENGTHS * lags {
             let seconds = |rows: usize| digits(rows as f64 * model.dt);
             let message = format!(
-                "{} s are too short for als: the filter settles in {} s and the autocovariance is taken up to {} s; expected at least {} s",
+                "{} s are too short for als: the filter settles in {} s and the autocovariance is taken up to {} s; \
+                 expected at least {} s",
                 seconds(rows),
                 seconds(first),
                 seconds(lags),
@@ -270,7 +271,8 @@ pub(super) fn choose(problem: &Problem<'_>, group: &Group, told: &mut Vec<AlsAxi
     if let Some(k) = found.sizes.iter().position(|size| *size <= 0.0) {
         let name = &names[k];
         return Err(failed(format!(
-            "the autocovariances of {samples} innovations show nothing of {name}: its variance is best zero; hold it (`hold` {name}), leave its \
+            "the autocovariances of {samples} innovations show nothing of {name}: its variance is best zero; hold it \
+             (`hold` {name}), leave its \
              term out, or give a longer log"
         )));
     }

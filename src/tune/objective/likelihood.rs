@@ -121,7 +121,8 @@ fn refuse_short(problem: &Problem<'_>, group: &Group) -> Result<(), ObjectiveErr
             if parameter.path.ends_with("correlation_time") && !known && span < LENGTHS_TO_TELL * time {
                 let name = problem.space.name(i);
                 return Err(wrong(format!(
-                    "{} s to be fitted to are too short for {name} of {} s, of which no interval is known; give a log that holds it {} times \
+                    "{} s to be fitted to are too short for {name} of {} s, of which no interval is known; give a log \
+                     that holds it {} times \
                      over, or hold it (`hold` {name})",
                     digits(span),
                     digits(time),

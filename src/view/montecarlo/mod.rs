@@ -6,6 +6,7 @@ use std::cell::OnceCell;
 use std::rc::Rc;
 
 use self::axis::AxisView;
+use super::answer::{self, three};
 use super::provenance;
 use crate::consistency::Test;
 use crate::montecarlo::outcome::{Component, Detectable, FalseAlarmRate, Measure, Method, Rejection, Sighting};
@@ -13,8 +14,8 @@ use crate::montecarlo::power::Needed;
 use crate::montecarlo::{AxisOutcome, Course, Experiment, Outcome, Path};
 use crate::params::{AxisParams, Measured, Params};
 use crate::report::figure::{self, Curve};
-use crate::report::{Conclusion, Level, Report, Section};
-use crate::units::{Unit, digits};
+use crate::report::{Level, Report, Section};
+use crate::units::{Unit, digits, significant};
 
 /// Most points of a path.
 const POINTS: u64 = 600;
@@ -62,7 +63,8 @@ pub fn montecarlo<'a>(of: MonteCarlo<'a>) -> Report<'a> {
     Report {
         title: "Monte Carlo consistency".into(),
         subtitle: "Does the filter's covariance tell the truth?".into(),
-        verdict: Some(Conclusion::new(outcome.verdict, outcome.meaning.clone())),
+        verdict: Some(answer::conclusion(outcome.verdict, &outcome.meaning, &outcome.tests)),
+        answer: answer(&of),
         provenance: origin(&of),
         sections,
         ..Report::default()
@@ -91,6 +93,48 @@ fn origin(of: &MonteCarlo<'_>) -> Vec<(String, String)> {
     ]))
 }
 
+/// The runs, each axis in three numbers, and what this gate would have seen.
+fn answer<'a>(of: &MonteCarlo<'_>) -> Section<'a> {
+    let outcome = of.outcome;
+    let runs = format!(
+        "{} runs of {}, {} tests, seed {}",
+        outcome.runs.count(),
+        answer::time(outcome.duration_s),
+        outcome.tests.len(),
+        outcome.seed
+    );
+    let row = |axis: &AxisOutcome| {
+        let nis: Vec<String> = axis.innovations.iter().map(|i| three(i.nis)).collect();
+        [
+            axis.name.clone(),
+            three(axis.nees_average.mean),
+            nis.join(", "),
+            coverage(axis),
+            answer::result(outcome.tests.iter().filter(|test| test.axis == axis.name)),
+        ]
+    };
+    let alarms = outcome.false_alarm_rate.as_ref().map(|rate| {
+        let [measured, wanted] = [rate.value, outcome.alpha].map(|share| three(100.0 * share));
+        format!("False alarms of this gate: {measured} % (wanted {wanted} %).")
+    });
+    // the sizes that are worst seen: what is finer is seen too
+    let factor = |d: &&Detectable| d.measure == Measure::Factor;
+    let size = |d: &Detectable| {
+        let percent = 100.0 * (d.too_large.as_ref()?.size - 1.0);
+        Some(format!("{} {} %", d.parameter, significant(percent, 2)))
+    };
+    let first = outcome.detects.first().map(|d| d.axis.clone());
+    let seen = outcome.detects.iter().filter(|d| Some(&d.axis) == first.as_ref()).filter(factor);
+    let seen: Vec<String> = seen.filter_map(size).collect();
+    let sees = first
+        .filter(|_| !seen.is_empty())
+        .map(|axis| format!("Sees with 90 % probability what is too large on {axis} by: {}.", seen.join(", ")));
+    Section::new("")
+        .table(runs, &["", "NEES", "NIS", "within 1, 2, 3 sigma", "result"], outcome.axes.iter().map(row))
+        .paragraphs(alarms.into_iter().chain(outcome.rejection.iter().map(rejected)).chain(sees).collect())
+        .paragraphs(of.plans.to_vec())
+}
+
 fn summary<'a>(outcome: &Outcome) -> Section<'a> {
     let runs = format!(
         "{} runs ({}..{}) of {} s, {} samples each, seed {}",
@@ -115,7 +159,7 @@ fn summary<'a>(outcome: &Outcome) -> Section<'a> {
             or_none(credibility.map(|c| c.meaning.clone())),
         ]
     };
-    Section::of_page("Summary").at(Level::Brief).paragraph(runs).table(
+    Section::of_page("Summary").at(Level::Full).paragraph(runs).table(
         "NEES (per component) and NIS are 1 when the covariance is right; NCI and inclination are 0 dB",
         &["axis", "NEES over time", "NIS", "NCI", "inclination", "within 1, 2, 3 sigma", "meaning"],
         outcome.axes.iter().map(row),

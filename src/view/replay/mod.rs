@@ -2,12 +2,13 @@
 
 mod attitude;
 
+use super::answer::{self, three};
 use super::{provenance, verdict};
 use crate::identify::Followed;
 use crate::numerics::distribution::{chi_square_cdf, chi_square_sf};
 use crate::replay::{AxisResult, Point, ReplayResult};
 use crate::report::figure::{self, Curve};
-use crate::report::{Conclusion, Report, Section};
+use crate::report::{Report, Section};
 use crate::units::{Quantity, Unit, digits, shown_unit};
 pub use attitude::attitude;
 
@@ -33,11 +34,32 @@ pub fn replay<'a>(result: &'a ReplayResult, filter: &str, unit: Option<&'a Unit>
     Report {
         title: format!("Replay of {log}"),
         subtitle: "A recorded log through the filter: are its innovations what the filter says?".into(),
-        verdict: Some(Conclusion::new(result.verdict, result.meaning.clone())),
+        verdict: Some(answer::conclusion(result.verdict, &result.meaning, &result.tests)),
+        answer: answer(result, unit),
         provenance: provenance(lines.into_iter().chain(gate)),
         sections,
         ..Report::default()
     }
+}
+
+/// Each axis with the size of its innovations, the slow ones that fit least, and what the filter says now.
+fn answer<'a>(result: &ReplayResult, unit: Option<&Unit>) -> Section<'a> {
+    let row = |axis: &AxisResult| {
+        let slow = axis.low_frequency.iter().min_by(|a, b| a.p_value.total_cmp(&b.p_value));
+        let now = &axis.final_output;
+        let (scale, shown) = in_log_unit(&now.unit, result.quantity, unit);
+        let [value, sigma] = [now.value, now.sigma].map(|v| three(v / scale));
+        [
+            axis.name.clone(),
+            axis.accepted.to_string(),
+            axis.nis.as_ref().map_or("-".into(), |nis| three(nis.mean)),
+            slow.map_or("-".into(), |slow| format!("{} of predicted", three(slow.ratio))),
+            format!("{value} ± {sigma} {shown}"),
+            answer::result(result.tests.iter().filter(|test| test.axis == axis.name)),
+        ]
+    };
+    let header = ["", "samples", "NIS", "slow power", "drift at the end", "result"];
+    Section::new("").table("", &header, result.axes.iter().map(row))
 }
 
 fn summary<'a>(result: &ReplayResult, unit: Option<&Unit>) -> Section<'a> {

@@ -1,6 +1,6 @@
 //! An attitude filter.
 
-use crate::report::{Level, Report, Section};
+use crate::report::{Report, Section};
 use crate::tune::TunedAttitude;
 use crate::units::digits;
 
@@ -38,7 +38,7 @@ pub fn attitude<'a>(name: &str, tuned: &TunedAttitude) -> Report<'a> {
     let first = ["time (s)", "inclination (deg)", "heading (deg)"].map(String::from);
     let header: Vec<String> = first.into_iter().chain(drifts).collect();
     let rate = digits(design.sample_rate_hz);
-    let headline = Section::new("").at(Level::Brief).paragraph(format!(
+    let headline = Section::new("").paragraph(format!(
         "{name}: plant attitude, {rate} Hz, aided by {aided}: {states} error states beside the quaternion"
     ));
     let numbers = Section::new("")

@@ -7,7 +7,8 @@ mod ranking;
 mod states;
 mod truth;
 
-use super::{alike, montecarlo, provenance};
+use super::answer::{self, three};
+use super::{alike, by_name, montecarlo, provenance};
 use crate::consistency::Verdict;
 use crate::filter::AxisDesign;
 use crate::montecarlo::{AxisOutcome, Outcome};
@@ -94,7 +95,7 @@ pub fn tune<'a>(of: &Design<'a>) -> Report<'a> {
     let mut sections: Vec<Section<'a>> = of.record.iter().map(|record| objective::section(record, params)).collect();
     let headline =
         format!("{}: plant {}, {} Hz, {}", of.name, of.tuned.design.plant, params.sample_rate_hz, measured(of));
-    sections.push(Section::new("").at(Level::Brief).paragraph(headline));
+    sections.push(Section::new("").paragraph(headline));
     sections.extend(groups.iter().map(group_section));
     sections.extend(groups.iter().filter_map(|group| {
         let insight = of.insights.iter().find(|insight| Some(&insight.axis.as_str()) == group.names.first())?;
@@ -113,11 +114,68 @@ pub fn tune<'a>(of: &Design<'a>) -> Report<'a> {
     Report {
         title: format!("Kalman filter from {}", of.name),
         subtitle: "Augmented bias filter: model, steady state, error budget, predicted accuracy".into(),
-        verdict: Some(Conclusion::new(outcome.verdict, verification_sentence(outcome, params.sample_rate_hz))),
+        verdict: Some(conclusion(of)),
+        answer: answer(of, &groups),
         provenance: provenance(lines.into_iter().chain(note.map(|note| ("source of the parameters", note)))),
         sections,
         ..Report::default()
     }
+}
+
+/// Of the verification; its answer is one line.
+fn conclusion(of: &Design<'_>) -> Conclusion {
+    let outcome = of.verification;
+    let sentence = verification_sentence(outcome, of.params.sample_rate_hz);
+    let conclusion = answer::conclusion(outcome.verdict, &sentence, &outcome.tests);
+    match outcome.verdict {
+        Verdict::Consistent => {
+            let (runs, tests) = (outcome.runs.count(), outcome.tests.len());
+            conclusion.brief(format!("the design passes {tests} tests in {runs} quick runs on its own model"))
+        }
+        _ => conclusion,
+    }
+}
+
+/// What the filter promises, one row for axes alike.
+fn answer<'a>(of: &Design<'_>, groups: &[Group<'_>]) -> Section<'a> {
+    let states = groups.first().map_or(0, |group| group.design.model.states.len());
+    let plant = &of.tuned.design.plant;
+    let plural = if states == 1 { "" } else { "s" };
+    let heading = format!("{}: {states} state{plural}, {} Hz, plant {plant}", of.name, three(of.params.sample_rate_hz));
+    let row = |group: &Group<'_>| {
+        let (model, report) = (&group.design.model, group.report);
+        let unit = answer::unit(&group.unit);
+        let sample = group.shown(&model.measurements[0].unit);
+        let of_sample = model.r[(0, 0)].sqrt() / sample.0;
+        let budget: f64 = report.error_budget.iter().map(|share| share.variance_si).sum();
+        let causes = report
+            .error_budget
+            .iter()
+            .filter(|share| share.share > 0.05)
+            .map(|share| format!("{} {:.0} %", share.source, 100.0 * share.share));
+        [
+            group.names.join(", "),
+            format!("{} {}", three(of_sample), sample.1),
+            match budget > 0.0 {
+                true => format!("{} {unit}", three(group.unit.from_si(budget.sqrt()))),
+                false => "tends to 0".into(),
+            },
+            report.drift_settling_time_s.map_or("-".into(), answer::time),
+            causes.collect::<Vec<_>>().join(", "),
+        ]
+    };
+    let replayed = of.replays.iter().map(|replay| {
+        format!("{}: {}: {}", replay.log.as_deref().unwrap_or("the log"), replay.verdict.word(), replay.meaning)
+    });
+    let truth = of.truth.iter().flat_map(|(_, results)| results.iter());
+    let under_truth: Vec<(&str, Vec<String>)> =
+        truth.map(|result| (result.name.as_str(), vec![format!("under the truth {}", result.meaning)])).collect();
+    let notes = groups.iter().map(|group| (group.names.first().copied().unwrap_or(""), &*group.report.warnings));
+    Section::new(heading)
+        .table("", &["", "one sample", "drift known to", "after", "caused by"], groups.iter().map(row))
+        .findings("note", answer::warnings(by_name(notes)))
+        .paragraphs(by_name(under_truth.iter().map(|(name, said)| (*name, said.as_slice()))))
+        .paragraphs(replayed.collect())
 }
 
 /// What the filter is given.
@@ -263,7 +321,7 @@ fn verification_sentence(outcome: &Outcome, sample_rate_hz: f64) -> String {
 /// The verdict of a log.
 fn replay<'a>(result: &ReplayResult) -> Section<'a> {
     let log = result.log.as_deref().unwrap_or("the log");
-    Section::of_page("Replay of a log").at(Level::Brief).paragraph(format!(
+    Section::of_page("Replay of a log").at(Level::Full).paragraph(format!(
         "{log} through this design: {}: {}",
         result.verdict.word(),
         result.meaning

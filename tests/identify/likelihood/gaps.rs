@@ -243,10 +243,10 @@ fn outliers_and_steps_are_told() {
     };
     let (plain, warnings) = density("");
     assert!((plain / 0.05 - 1.6).abs() < 0.1, "{plain}");
-    assert!(warnings.contains("20 of 20000 samples") && warnings.contains("`robust`"), "{warnings}");
-    let (robust, warnings) = density(" --robust");
+    assert!(warnings.contains("20 of 20000 samples") && warnings.contains("`without_outliers`"), "{warnings}");
+    let (robust, warnings) = density(" --without-outliers");
     assert!((robust / 0.05 - 1.0).abs() < 4.0 / 40_000f64.sqrt(), "{robust}");
-    assert!(warnings.contains("20 outliers were left out") && !warnings.contains("`robust`"), "{warnings}");
+    assert!(warnings.contains("20 outliers were left out") && !warnings.contains("`without_outliers`"), "{warnings}");
     let mut stepped = log(&[white(0.05)], 20_000, 0.01, 9, 0);
     stepped[12_000..].iter_mut().for_each(|x| *x += 0.3);
     bench.file("step.csv", text(&stepped));

@@ -1,4 +1,4 @@
-//! `tune --objective` and `tune --compare` as commands: documents, exit status, bad input.
+//! `tune --objective` and `tune --rank` as commands: documents, exit status, bad input.
 
 use kfdesign::filter::FilterDesign;
 use serde_json::Value;
@@ -66,7 +66,7 @@ fn the_record_of_the_tuning_is_in_the_design_that_is_written() {
 fn designs_are_ranked_by_what_they_foretell() {
     let bench = bench();
     bench.ok("tune wrong.json --runs 20 -o filter.json");
-    let ranking = json(&bench.ok("tune --json --compare filter.json params.json log.npy"));
+    let ranking = json(&bench.ok("tune --json --rank filter.json params.json log.npy"));
     let designs = ranking["designs"].as_array().unwrap();
     assert_eq!([&designs[0]["design"], &designs[1]["design"]], ["params.json", "filter.json"]);
     assert_eq!(designs[0]["behind"], 0.0);
@@ -81,7 +81,7 @@ fn designs_are_ranked_by_what_they_foretell() {
     let before = tuned["filter"]["tuning"]["likelihood"][0]["logs"][0]["held_out_before"].as_f64().unwrap();
     let ranked = designs[0]["held_out_log_likelihood"].as_f64().unwrap();
     assert!((ranked - before).abs() < 1e-6, "{ranked} {before}");
-    let text = bench.ok("tune --compare filter.json params.json log.npy");
+    let text = bench.ok("tune --rank filter.json params.json log.npy");
     assert!(text.contains("params.json foretells what was held out clearly best"), "{text}");
 }
 
@@ -166,10 +166,10 @@ fn bad_requests_are_one_line_and_write_nothing() {
         ("tune params.json --objective als --log short.csv", "too short for als"),
         ("tune params.json --objective likelihood --log log.npy --held-out 2", "--held-out is 2; expected a share"),
         ("tune params.json --objective likelihood --log none.csv", "none.csv: there is no such file"),
-        ("tune --compare params.json", "found 1 designs (.json) and 0 logs"),
-        ("tune --compare log.npy", "found 0 designs (.json) and 1 logs"),
-        ("tune --compare params.json log.npy --held-out 0", "--held-out is 0"),
-        ("tune --compare params.json none.csv", "none.csv: there is no such file"),
+        ("tune --rank params.json", "found 1 designs (.json) and 0 logs"),
+        ("tune --rank log.npy", "found 0 designs (.json) and 1 logs"),
+        ("tune --rank params.json log.npy --held-out 0", "--held-out is 0"),
+        ("tune --rank params.json none.csv", "none.csv: there is no such file"),
         ("tune", "required"),
     ] {
         let output = if command.contains("compare") { "" } else { " -o filter.json" };

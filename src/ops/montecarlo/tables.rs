@@ -5,17 +5,20 @@ use std::path::Path;
 
 use anyhow::bail;
 
-use super::Args;
-use crate::cli::Status;
-use crate::cli::output::print_text;
+use super::Request;
 use crate::export::table::TableWriter;
 use crate::montecarlo::{Course, Experiment};
 use crate::units::digits;
 
-/// One run alone, as a table.
-pub(super) fn one_run(args: &Args, experiment: &Experiment, course: &Course, number: u64) -> anyhow::Result<Status> {
-    let Some(path) = &args.outputs.output else {
-        bail!("--run {number} needs -o FILE for its numbers (.csv, .csv.gz or .npy)")
+/// One run alone, as a table; what there is to say of it.
+pub(super) fn one_run(
+    request: &Request,
+    experiment: &Experiment,
+    course: &Course,
+    number: u64,
+) -> anyhow::Result<String> {
+    let Some(path) = &request.output else {
+        bail!("`run` {number} needs `output` FILE for its numbers (.csv, .csv.gz or .npy)")
     };
     let traces = course.trace(number);
     let time: Vec<f64> = (0..course.steps).map(|step| step as f64 * course.dt).collect();
@@ -44,16 +47,13 @@ pub(super) fn one_run(args: &Args, experiment: &Experiment, course: &Course, num
     let mut writer = TableWriter::create(path, &header)?;
     writer.write(&columns)?;
     writer.finish()?;
-    if !args.outputs.json {
-        print_text(&format!(
-            "run {number} (seed {}): {} samples of {} s in {}\n",
-            course.seed,
-            course.steps,
-            digits(course.dt),
-            path.display()
-        ));
-    }
-    Ok(Status::Done)
+    Ok(format!(
+        "run {number} (seed {}): {} samples of {} s in {}",
+        course.seed,
+        course.steps,
+        digits(course.dt),
+        path.display()
+    ))
 }
 
 /// Average NEES per component and NIS at every step.

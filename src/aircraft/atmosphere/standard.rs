@@ -54,7 +54,7 @@ pub fn at_geopotential(height: f64) -> Result<Air, AirError> {
 /// ```
 /// let air = kfdesign::aircraft::atmosphere::standard::at(0.0)?;
 /// assert!((air.density - 1.225).abs() < 1e-6);
-/// # Ok::<(), kfdesign::aircraft::atmosphere::standard::AirError>(())
+/// # Ok::<(), kfdesign::aircraft::atmosphere::AirError>(())
 /// ```
 pub fn at(height: f64) -> Result<Air, AirError> {
     at_geopotential(geopotential(height))

@@ -133,7 +133,7 @@ def aircraft(folder, loaded):
     if loaded:
         for surface in ("de", "da", "dr"):
             channels += (
-                f'<channel name="{surface}"><actuator name="{surface}"><input>ext/{surface}-told</input><lag>35</lag>'
+                f'<channel name="{surface}"><actuator name="{surface}"><input>ext/{surface}-command</input><lag>35</lag>'
                 "<rate_limit>5.236</rate_limit><clipto><min>-0.436</min><max>0.436</max></clipto>"
                 f"<output>ext/{surface}-pos</output></actuator></channel>"
             )
@@ -150,20 +150,20 @@ def aircraft(folder, loaded):
             '<washout_filter name="turning"><input>ext/sensor2</input><c1>1.0</c1>'
             "<output>ext/turning</output></washout_filter>"
         )
-        told = {name: f"ext/{name}" for name in ("de", "da", "dr", "turning")}
-        told |= {"p": "ext/sensor0", "q": "ext/sensor1", "phi": "attitude/phi-rad", "theta": "attitude/theta-rad"}
+        inputs = {name: f"ext/{name}" for name in ("de", "da", "dr", "turning")}
+        inputs |= {"p": "ext/sensor0", "q": "ext/sensor1", "phi": "attitude/phi-rad", "theta": "attitude/theta-rad"}
         laws = {
             "de": "de+0.2*q+0.6*(theta-0.053874)", "da": "da-0.06*p-0.6*(phi+0.00053)", "dr": "dr+0.15*turning",
         }
         for surface, law in laws.items():
             channels += (
                 f'<fcs_function name="law-{surface}"><function name="law/{surface}">'
-                f"{expression(law, told)}</function>"
-                f"<output>ext/{surface}-told</output></fcs_function>"
+                f"{expression(law, inputs)}</function>"
+                f"<output>ext/{surface}-command</output></fcs_function>"
             )
         channels += "</channel>"
     properties = ["de", "da", "dr", "dt", "turning", *(f"sensor{k}" for k in range(6))]
-    properties += [f"{surface}-{what}" for surface in ("de", "da", "dr") for what in ("pos", "told")]
+    properties += [f"{surface}-{what}" for surface in ("de", "da", "dr") for what in ("pos", "command")]
     declared = "".join(f'<property value="0">ext/{k}</property>' for k in properties)
     moment = {k: repr(number(v) / SLUGFT2) for k, v in inertia.items()}
     text = f"""<?xml version="1.0"?>

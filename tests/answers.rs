@@ -65,6 +65,12 @@ fn answers_are_short_and_first() {
     bench.file("slow.json", text.replace("\"value\": 100.0, \"unit\": \"Hz\"", "\"value\": 20.0, \"unit\": \"Hz\""));
     answer(&bench, "simulate slow.json -o log.csv --duration 2h --seed 1", 0);
     chain(&bench, "log.csv", "", 0);
+    // N stands at one second, between the points of the grid; drift and 2 h of white noise change it by 1 % at most
+    let curve = answer(&bench, "allan log.csv --taus octave", 0);
+    for row in curve.lines().filter(|line| line.starts_with("gyro_")) {
+        let value: f64 = row.split_whitespace().nth(1).unwrap().parse().unwrap();
+        assert!((value / 0.0562 - 1.0).abs() < 0.05, "{row}");
+    }
     let mut wrong = Params::read(&bench.path("slow.json")).unwrap();
     for (_, value) in wrong
         .axes

@@ -182,7 +182,11 @@ pub fn run(args: impl IntoIterator<Item = OsString>, stop: &Stop) -> u8 {
 fn with_options(args: &[OsString], missing: &[(&str, String)]) -> String {
     let quoted = |word: &str| {
         let plain = |c: char| c.is_alphanumeric() || "_./,:=+-^".contains(c);
-        if !word.is_empty() && word.chars().all(plain) { word.to_owned() } else { format!("'{word}'") }
+        if !word.is_empty() && word.chars().all(plain) {
+            word.to_owned()
+        } else {
+            format!("'{}'", word.replace('\'', "'\\''"))
+        }
     };
     let typed = args.iter().skip(1).map(|word| quoted(&word.to_string_lossy()));
     let options = missing.iter().flat_map(|(option, value)| [format!("--{option}"), quoted(value)]);

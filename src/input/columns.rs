@@ -59,27 +59,27 @@ impl Table<'_> {
     /// Time column and axes for these options. What is missing is said at once, not one thing after the other: where
     /// an option is missing, the search goes on as if it were there.
     pub(super) fn choose(&self, options: &LogOptions) -> Result<Choice, InputError> {
-        let mut all: Option<InputError> = None;
+        let mut all = match self.chosen(options) {
+            Err(error) if !error.missing.is_empty() => error,
+            chosen => return chosen,
+        };
         let mut as_if = options.clone();
         loop {
-            match (self.chosen(&as_if), &mut all) {
-                (Ok(choice), None) => return Ok(choice),
-                (Err(error), None) if error.missing.is_empty() => return Err(error),
-                (Err(error), None) => all = Some(error),
-                (Err(error), Some(all)) if error.missing.iter().any(|new| !all.missing.contains(new)) => {
-                    all.message +=
-                        &format!("; {}", error.message.trim_start_matches(self.place).trim_start_matches(": "));
-                    all.missing.extend(error.missing);
-                }
-                (_, Some(_)) => return Err(all.unwrap_or_else(|| InputError::new(self.place))),
-            }
-            for (option, value) in all.iter().flat_map(|all| &all.missing) {
+            for (option, value) in &all.missing {
                 match *option {
                     "columns" => as_if.columns = Some(value.split(',').map(String::from).collect()),
                     "unit" => as_if.unit = Unit::parse(value).ok(),
                     "time" => as_if.time = Some(value.clone()),
                     _ => as_if.rate_hz = value.parse().ok(),
                 }
+            }
+            match self.chosen(&as_if) {
+                Err(next) if next.missing.iter().any(|new| !all.missing.contains(new)) => {
+                    let message = next.message.trim_start_matches(self.place).trim_start_matches(": ");
+                    all.message += &format!("; {message}");
+                    all.missing.extend(next.missing);
+                }
+                _ => return Err(all),
             }
         }
     }

@@ -57,7 +57,12 @@ pub struct Request {
     #[serde(default = "one")]
     pub filter_order: u32,
     /// Bias instability, in-run bias stability: "2.3 deg/h", "0.04 mg"
-    #[arg(long, visible_aliases = ["in-run-bias-stability", "bias-stability"], value_name = "VALUE", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        visible_aliases = ["in-run-bias-stability", "bias-stability"],
+        value_name = "VALUE",
+        allow_hyphen_values = true
+    )]
     #[serde(default)]
     pub bias_instability: Option<String>,
     /// What the bias instability is
@@ -74,7 +79,12 @@ pub struct Request {
     #[serde(default)]
     pub rate_random_walk: Option<String>,
     /// Turn-on bias, zero-rate offset, bias repeatability, as one standard deviation: "0.5 deg/s"
-    #[arg(long, visible_aliases = ["zero-rate-offset", "zero-g-offset", "bias-repeatability"], value_name = "VALUE", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        visible_aliases = ["zero-rate-offset", "zero-g-offset", "bias-repeatability"],
+        value_name = "VALUE",
+        allow_hyphen_values = true
+    )]
     #[serde(default)]
     pub turn_on_bias: Option<String>,
     /// Sample rate of the log in Hz

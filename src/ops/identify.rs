@@ -154,8 +154,8 @@ struct AxisDocument<'a> {
     /// Likelihood only, where the log has a temperature.
     #[serde(skip_serializing_if = "Option::is_none")]
     temperature: Option<TemperatureDocument<'a>>,
-    /// Excess kurtosis of the whitened log, which the intervals of the coefficients know; with --without-outliers the law of
-    /// the noise, where it has tails.
+    /// Excess kurtosis of the whitened log, which the intervals of the coefficients know; with --without-outliers the
+    /// law of the noise, where it has tails.
     tails: Tails,
     /// Of several logs: whether each parameter is the same in all.
     #[serde(skip_serializing_if = "<[Between]>::is_empty")]

@@ -96,7 +96,7 @@ fn scatter(law: Law, robust: bool, samples: usize, runs: u64) -> [f64; 4] {
     [mean(0), bias, sd, mean(2)]
 }
 
-/// Logs of 10,000 samples, 40 of each law. A true interval misses 2 of 40 (of t4 without --without-outliers 3): 11 and more by
+/// Logs of 10,000 samples, 40 of each law. A true interval misses 2 of 40 (of t4 with outliers 3): 11 and more by
 /// chance in fewer than one in 2000 of these eight rows together but for that one (5e-4), and the mean error is
 /// within 4.5 of its standard errors (8 rows: 6e-5). Intervals of normal noise alone miss 20 of t4; without its
 /// tails put back N of t4 is 5 % too small with --without-outliers.
@@ -140,7 +140,7 @@ fn every_method_knows_the_kurtosis() {
 #[ignore = "a study of minutes that prints figures, not a check"]
 fn law_study_of_intervals() {
     println!(
-        "| noise | --without-outliers | N is of | 95 % intervals that hold it | mean error of N | sd | sd claimed | ratio |"
+        "| noise | without outliers | N is of | 95 % intervals that hold it | mean error of N | sd | sd claimed | ratio |"
     );
     println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
     let runs = study_runs().min(200);

@@ -1,5 +1,5 @@
-//! Every measured file that is at hand is read or refused as the table in docs/validation/reading.md says, and the table has
-//! all of them.
+//! Every measured file that is at hand is read or refused as the table in docs/validation/reading.md says, and the
+//! table has all of them.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

@@ -67,7 +67,8 @@ pub struct Request {
     pub replicates: u64,
     /// Simulate this run alone; -o takes its numbers (.csv, .csv.gz or .npy)
     #[arg(long, value_name = "NUMBER", value_parser = whole::<u64>, allow_negative_numbers = true,
-        conflicts_with_all = ["runs", "resume", "replicates", "json", "junit", "report", "power", "runs_for", "confirm"])]
+        conflicts_with_all = ["runs", "resume", "replicates", "json", "junit", "report", "power", "runs_for",
+            "confirm"])]
     #[serde(default)]
     pub run: Option<u64>,
     /// Average NEES and NIS at every step, as a table (.csv, .csv.gz or .npy)

@@ -30,8 +30,8 @@ pub(super) const JUMP: u64 = 1024;
 /// Of a name that is no column's: in the list that is kept, in a note, and in what is printed.
 const NAMED: u64 = 3;
 /// What has a name, without it, in the copies that a command makes of it: in a list of columns or of topics, as a row
-/// of what `info` prints.
-const ENTRY: u64 = 640;
+/// of what `info` prints. Measured: of a text without names 15,500 columns stay within the promise, 16,000 do not.
+const ENTRY: u64 = 704;
 /// Of its name: as header, column, and in the list that `info` prints.
 const COPIES: u64 = 10;
 

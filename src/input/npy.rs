@@ -188,7 +188,7 @@ fn layout(header: &Header, length: u64, account: &Account) -> Result<(Vec<Column
     if rows == 0 {
         return Err("the array has no rows".into());
     }
-    account.columns(if header.named { 0 } else { per_row }, 12)?;
+    account.columns(if header.named { 0 } else { per_row }, Head::numbered(per_row as usize).full.len())?;
     let mut columns = Vec::new();
     if header.named {
         for field in &header.fields {

@@ -220,7 +220,7 @@ fn describe(
     // a separator behind the last field of every row makes no further column
     let dangling = usual > 1 && body.iter().map(|l| shape(l.text, delimiter)).all(|(n, empty)| n != usual || empty);
     let columns = if dangling { usual - 1 } else { usual };
-    account.columns(columns as u64, 8)?;
+    account.columns(columns as u64, Head::numbered(columns).full.len())?;
     let fits = |text: &[u8]| {
         let (n, last_empty) = shape(text, delimiter);
         n == columns || (n == columns + 1 && last_empty)

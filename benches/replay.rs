@@ -55,7 +55,7 @@ fn axis(name: &str) -> AxisDesign {
         terms: vec![],
         not_identified: vec![],
     };
-    AxisDesign { name: name.into(), model, steady_state, noise }
+    AxisDesign { name: name.into(), model, steady_state, noise, about: Default::default() }
 }
 
 fn blocks() -> Vec<Block> {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// The one table of rooms: floor, room, and the rooms of its own floor it may use besides every lower floor.
 /// `docs/architecture.md` shows the same table.
-const HOUSE: [(u8, &str, &[&str]); 26] = [
+const HOUSE: [(u8, &str, &[&str]); 27] = [
     (0, "units", &[]),
     (0, "numerics", &[]),
     (1, "signal", &[]),
@@ -27,6 +27,7 @@ const HOUSE: [(u8, &str, &[&str]); 26] = [
     (4, "aircraft/flight", &[]),
     (5, "compare", &[]),
     (5, "montecarlo", &[]),
+    (5, "aircraft/closed_loop", &[]),
     (6, "export", &[]),
     (6, "report", &[]),
     (7, "view", &[]),

@@ -222,6 +222,7 @@ true_pages! {
     formats: "docs/formats.md",
     goodness_of_fit: "docs/goodness-of-fit.md",
     import: "docs/import.md",
+    control_loop: "docs/loop.md",
     low_pass: "docs/low-pass.md",
     noise_models: "docs/noise-models.md",
     plants: "docs/plants.md",

@@ -64,6 +64,7 @@ fn axis(name: &str, dt: f64, q: f64, phi: f64, r: f64, x0: [f64; 2], p0: [f64; 2
             terms: vec![],
             not_identified: vec![],
         },
+        about: Default::default(),
     }
 }
 

@@ -5,5 +5,6 @@
 
 pub mod airframe;
 pub mod atmosphere;
+pub mod closed_loop;
 pub mod control;
 pub mod flight;

@@ -5,6 +5,7 @@
 
 pub mod airplane;
 pub mod allan;
+pub mod closed_loop;
 pub mod compare;
 pub mod completions;
 pub mod datasheet;
@@ -99,6 +100,7 @@ enum Command {
     Airplane(airplane::Args),
     Trim(trim::Args),
     Fly(fly::Args),
+    Loop(closed_loop::Args),
     Tune(tune::Args),
     Replay(replay::Args),
     Montecarlo(montecarlo::Args),
@@ -154,6 +156,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>, stop: &Stop) -> u8 {
         Command::Airplane(args) => airplane::run(&args),
         Command::Trim(args) => trim::run(&args),
         Command::Fly(args) => fly::run(&args),
+        Command::Loop(args) => closed_loop::run(&args),
         Command::Tune(args) => tune::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Montecarlo(args) => montecarlo::run(&args, stop),

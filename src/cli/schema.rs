@@ -5,6 +5,7 @@ use clap::ValueEnum;
 use super::{Status, output};
 use crate::aircraft::airframe::AirplaneDocument;
 use crate::aircraft::airframe::check::AirplaneCheck;
+use crate::aircraft::closed_loop::document::LoopDocument;
 use crate::aircraft::control::document::LinearDocument;
 use crate::aircraft::flight::{FlightDocument, FlightReport};
 use crate::compare::Comparison;
@@ -16,8 +17,8 @@ use crate::input::inspect::Inventory;
 use crate::montecarlo;
 use crate::ops::montecarlo as runs;
 use crate::ops::{
-    airplane, allan, compare, datasheet, export, fly, identify, import, inflate, info, plan, replay, simulate, trim,
-    tune,
+    airplane, allan, closed_loop, compare, datasheet, export, fly, identify, import, inflate, info, plan, replay,
+    simulate, trim, tune,
 };
 use crate::params::Params;
 use crate::replay::ReplayResult;
@@ -51,6 +52,8 @@ enum Document {
     Flight,
     /// What `fly --json` prints
     Fly,
+    /// What `loop --json` prints
+    Loop,
     /// What `info --json` prints
     Info,
     /// What `allan --json` prints
@@ -111,6 +114,8 @@ enum Document {
     ImportRequest,
     /// What `datasheet` is asked for
     DatasheetRequest,
+    /// What `loop` is asked for
+    LoopRequest,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
@@ -124,6 +129,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         Document::AirplaneCheck => printed::<AirplaneCheck>(),
         Document::Flight => FlightDocument::schema(),
         Document::Fly => printed::<FlightReport>(),
+        Document::Loop => printed::<LoopDocument>(),
         Document::Montecarlo => montecarlo::document::schema(),
         Document::Compare => printed::<Comparison>(),
         Document::Inflate => printed::<Inflation>(),
@@ -153,6 +159,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         Document::ExportRequest => asked::<export::Request>(),
         Document::ImportRequest => asked::<import::Request>(),
         Document::DatasheetRequest => asked::<datasheet::Request>(),
+        Document::LoopRequest => asked::<closed_loop::Request>(),
     })?;
     Ok(Status::Done)
 }

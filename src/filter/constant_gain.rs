@@ -63,18 +63,18 @@ impl ConstantGain {
     }
 
     /// As [`Kalman::advance`], x alone.
-    pub fn advance(&mut self, steps: u64, input: Option<f64>) {
+    pub fn advance(&mut self, steps: u64, inputs: Option<&[f64]>) {
         if steps == 1 {
             self.before.copy_from(&self.kalman.x);
             self.kalman.x.gemv(1.0, &self.f, &self.before, 0.0);
-            if let Some(u) = input {
-                self.kalman.drive(&[u]);
+            if let Some(u) = inputs {
+                self.kalman.drive(u);
             }
             return;
         }
         // over a gap, with the powers of F that the filter has
         let claimed = self.kalman.p.clone();
-        self.kalman.advance(steps, input);
+        self.kalman.advance(steps, inputs);
         self.kalman.p = claimed;
     }
 

@@ -1,11 +1,17 @@
 //! What filter.json holds.
 
+use std::collections::BTreeMap;
+
 use serde_json::Value;
 
 use super::steady_state::SteadyState;
 use crate::model::LinearModel;
 use crate::params::{AxisParams, Design};
 use crate::units::Quantity;
+
+/// The plant that stands in no params.json, since it is made of a flight: every input is a command that is known, every
+/// measurement after the first one of another sensor.
+pub const AIRPLANE: &str = "airplane";
 
 /// The filter of one axis with its steady state and origin.
 #[derive(Clone, Debug)]
@@ -15,6 +21,9 @@ pub struct AxisDesign {
     pub steady_state: SteadyState,
     /// The terms it was built from, as documented.
     pub noise: AxisParams,
+    /// What the model is linear about: values of inputs and measurements (SI) that are taken off before the filter sees
+    /// them, by name; zero where there is none.
+    pub about: BTreeMap<String, f64>,
 }
 
 /// A tuned filter: what `tune` writes and `replay`, `montecarlo` and `export` read.
@@ -22,7 +31,7 @@ pub struct AxisDesign {
 pub struct FilterDesign {
     pub quantity: Quantity,
     pub sample_rate_hz: f64,
-    /// "static", "angle", "rate", "vertical" or "custom".
+    /// "static", "angle", "rate", "vertical", "airplane" or "custom".
     pub plant: String,
     /// The plant and its aids as documented; absent for a sensor at rest.
     pub design: Option<Design>,

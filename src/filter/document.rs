@@ -1,6 +1,7 @@
 //! The filter.json document: what a design holds, how it is written, its schema. `reading` reads and checks it.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use nalgebra::DMatrix;
@@ -74,7 +75,7 @@ struct FilterDocument {
     /// Frequency, for example "100 Hz".
     #[schemars(with = "Measured")]
     sample_rate: InUnit,
-    /// What is measured beside the sensor's own errors: "static", "angle", "rate", "vertical" or "custom".
+    /// What is measured beside the sensor's own errors: "static", "angle", "rate", "vertical", "airplane" or "custom".
     plant: String,
     /// The plant and its aids, as in params.json.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -136,6 +137,10 @@ struct AxisDocument {
     /// The terms it was built from, as in params.json.
     #[schemars(with = "Option<AxisParams>")]
     noise: AxisParams,
+    /// What the model is linear about: values of inputs and measurements that are taken off before the filter sees
+    /// them, by name; zero where there is none.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    about: BTreeMap<String, f64>,
 }
 
 #[derive(Serialize, JsonSchema)]
@@ -266,6 +271,7 @@ impl From<&AxisDesign> for AxisDocument {
             p0: rows_of(&model.p0),
             steady_state: SteadyStateDocument::from(&axis.steady_state),
             noise: axis.noise.clone(),
+            about: axis.about.clone(),
         }
     }
 }

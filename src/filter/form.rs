@@ -80,14 +80,14 @@ impl Running {
     }
 
     /// As [`Kalman::advance`].
-    pub fn advance(&mut self, steps: u64, input: Option<f64>) {
+    pub fn advance(&mut self, steps: u64, inputs: Option<&[f64]>) {
         match self {
-            Running::Joseph(kalman) => kalman.advance(steps, input),
+            Running::Joseph(kalman) => kalman.advance(steps, inputs),
             Running::SquareRoot(both) => {
                 let (root, bridge) = &mut **both;
-                root.advance(steps, input, bridge);
+                root.advance(steps, inputs, bridge);
             }
-            Running::ConstantGain(constant) => constant.advance(steps, input),
+            Running::ConstantGain(constant) => constant.advance(steps, inputs),
         }
     }
 

@@ -61,7 +61,7 @@ pub fn run(model: &LinearModel, log: &SensorLog, rows: usize, mut visit: impl Fn
     for row in 0..rows.min(log.len()) {
         if row > 0 {
             let steps = log.missing[row].saturating_add(1);
-            kalman.advance(steps, input);
+            kalman.advance(steps, input.as_ref().map(std::slice::from_ref));
             step = step.saturating_add(steps);
         }
         let sensor = log.sensor[row];

@@ -114,16 +114,16 @@ impl Kalman {
         }
     }
 
-    /// So many predictions, an input keeping its value; a gap of a million samples or more has lost an integrated
-    /// input whatever it was.
-    pub fn advance(&mut self, steps: u64, input: Option<f64>) {
-        match (steps, input) {
+    /// So many predictions, the inputs keeping their values; a gap of a million samples or more has lost an integrated
+    /// input whatever it was. `inputs`: none before there is a first value.
+    pub fn advance(&mut self, steps: u64, inputs: Option<&[f64]>) {
+        match (steps, inputs) {
             (1, None) => self.predict(),
             (steps, None) | (steps @ LONGEST_HELD.., Some(_)) => self.predict_many(steps),
             (steps, Some(u)) => {
                 for _ in 0..steps {
                     self.predict();
-                    self.drive(&[u]);
+                    self.drive(u);
                 }
             }
         }

@@ -56,7 +56,7 @@ pub mod whole_log;
 pub use attitude::{AttitudeDesign, AttitudeModel};
 pub use constant_gain::ConstantGain;
 pub use cycle::Cycle;
-pub use design::{AxisDesign, FilterDesign, FilterError};
+pub use design::{AIRPLANE, AxisDesign, FilterDesign, FilterError};
 pub use form::{Form, Running};
 pub use gains::GainSequence;
 pub use innovations::SensorLog;

@@ -1,9 +1,11 @@
 //! filter.json into a [`FilterDesign`], with the place of every complaint.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
 
-use super::design::{AxisDesign, FilterDesign};
+use super::design::{AIRPLANE, AxisDesign, FilterDesign};
 use super::steady_state::{SteadyState, steady_state};
 use crate::model::{LinearModel, ModelError, Named, Output};
 use crate::params::place::{KeyError, Object, Place};
@@ -25,8 +27,11 @@ pub(super) fn design(root: &Place<'_>) -> Result<FilterDesign, KeyError> {
     let sample_rate_hz = rate.si();
     let plant_place = object.required("plant")?;
     let name = plant_place.text()?;
-    let plant =
-        PLANTS.into_iter().find(|p| *p == name).ok_or_else(|| plant_place.error(params::unknown_plant(name)))?;
+    let plant = PLANTS
+        .into_iter()
+        .chain([AIRPLANE])
+        .find(|p| *p == name)
+        .ok_or_else(|| plant_place.error(params::unknown_plant(name)))?;
     let section =
         object.optional("design").map(|place| Ok((place.clone(), Design::from_place(&place)?))).transpose()?;
     if let Some((place, design)) = section.as_ref().filter(|(_, design)| design.plant.name() != plant) {
@@ -66,6 +71,7 @@ fn axis(place: &Place<'_>, quantity: Quantity, plant: &str, dt: f64) -> Result<A
         "P0",
         "steady_state",
         "noise",
+        "about",
     ])?;
     let name_place = object.required("name")?;
     let name = name_place.text()?.to_owned();
@@ -89,7 +95,16 @@ fn axis(place: &Place<'_>, quantity: Quantity, plant: &str, dt: f64) -> Result<A
             not_identified: Vec::new(),
         },
     };
-    Ok(AxisDesign { name, model, steady_state, noise })
+    let about = object.optional("about").map_or(Ok(BTreeMap::new()), |place| about(&place, &model))?;
+    Ok(AxisDesign { name, model, steady_state, noise, about })
+}
+
+/// Values of inputs and measurements, by name.
+fn about(place: &Place<'_>, model: &LinearModel) -> Result<BTreeMap<String, f64>, KeyError> {
+    let known: Vec<&str> = model.inputs.iter().chain(&model.measurements).map(|named| named.name.as_str()).collect();
+    let object = place.object(&known)?;
+    let value = |name: &&str| Some((object.optional(name)?.number(), (*name).to_owned()));
+    known.iter().filter_map(value).map(|(number, name)| Ok((name, number?))).collect()
 }
 
 /// The matrices as they stand; [`LinearModel::check`] judges them.

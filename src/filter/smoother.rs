@@ -13,28 +13,34 @@ use super::kalman::Kalman;
 use crate::model::LinearModel;
 use crate::numerics::progress::checkpoint;
 
-/// What a filter was given, row by row: predictions with the input that was held, then the measurements that it
+/// What a filter was given, row by row: predictions with the inputs that were held, then the measurements that it
 /// accepted.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct History {
     rows: Vec<Row>,
     /// Measurement (row of H) and value.
     taken: Vec<(usize, f64)>,
+    /// Of all rows that have them, one behind the other.
+    inputs: Vec<f64>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Row {
     /// Predictions since the row before; 0 for the first.
     steps: u64,
-    input: Option<f64>,
+    /// Where its inputs begin and end in `inputs`; none before there was a first value.
+    inputs: Option<(usize, usize)>,
     /// Where its measurements end in `taken`.
     end: usize,
 }
 
 impl History {
     /// A new row, so many predictions after the one before.
-    pub fn row(&mut self, steps: u64, input: Option<f64>) {
-        self.rows.push(Row { steps, input, end: self.taken.len() });
+    pub fn row(&mut self, steps: u64, inputs: Option<&[f64]>) {
+        let first = self.inputs.len();
+        self.inputs.extend(inputs.unwrap_or_default());
+        let inputs = inputs.map(|_| (first, self.inputs.len()));
+        self.rows.push(Row { steps, inputs, end: self.taken.len() });
     }
 
     /// A measurement that was accepted in this row, in the order of the updates.
@@ -159,7 +165,7 @@ fn power(f: &DMatrix<f64>, mut n: u64) -> DMatrix<f64> {
 fn step(model: &LinearModel, history: &History, filter: &mut Kalman, k: usize, mut told: impl FnMut(Taken)) {
     let row = history.rows[k];
     if row.steps > 0 {
-        filter.advance(row.steps, row.input);
+        filter.advance(row.steps, row.inputs.map(|(from, to)| &history.inputs[from..to]));
     }
     for (measurement, z) in history.of(k) {
         let cross = &filter.p * model.h.row(*measurement).transpose();

@@ -140,11 +140,11 @@ impl<T: RealField + Copy> SquareRoot<T> {
 
 impl SquareRoot {
     /// As [`Kalman::advance`]; over a long gap by way of `bridge`, a filter of the same model.
-    pub fn advance(&mut self, steps: u64, input: Option<f64>, bridge: &mut Kalman) {
+    pub fn advance(&mut self, steps: u64, inputs: Option<&[f64]>, bridge: &mut Kalman) {
         if steps > STEPPED_GAP {
             bridge.x.copy_from(&self.x);
             bridge.p = self.covariance();
-            bridge.advance(steps, input);
+            bridge.advance(steps, inputs);
             if let Ok(factor) = cholesky_semidefinite(&bridge.p) {
                 self.x.copy_from(&bridge.x);
                 self.factor = factor;
@@ -153,8 +153,8 @@ impl SquareRoot {
         }
         for _ in 0..steps {
             self.predict();
-            if let Some(u) = input {
-                self.drive(&[u]);
+            if let Some(u) = inputs {
+                self.drive(u);
             }
         }
     }

@@ -38,6 +38,9 @@ pub struct AxisCourse {
     pub epochs: Vec<EpochCourse>,
     pub channels: Vec<Channel>,
     pub(super) layout: Layout,
+    /// A plant that nothing holds runs away, and what is left of its error is rounding: truth and estimate are moved
+    /// together, which changes neither errors nor innovations where both have the same F.
+    pub(super) moved_back: bool,
     /// Law of the NEES summed over the evenly spread epochs; the gate fills it in when it first asks.
     pub(super) over_time: OnceLock<QuadraticForm>,
 }
@@ -56,6 +59,9 @@ pub struct EpochCourse {
     /// Claimed standard deviation of each component.
     pub sigma: Vec<f64>,
 }
+
+/// A pole that is not beyond one but by rounding.
+const STANDS: f64 = 1.0 + 1e-9;
 
 impl AxisCourse {
     /// `truth`: the model that is simulated.
@@ -95,6 +101,9 @@ impl AxisCourse {
         let failed = |what, source| MonteCarloError::Truth { axis: design.name.clone(), what, source };
         cholesky_semidefinite(&truth.p0).map_err(|e| failed("P0", e))?;
         cholesky_semidefinite(&truth.q).map_err(|e| failed("Q", e))?;
+        let grows =
+            |m: &LinearModel| crate::numerics::linalg::eigenvalues(&m.f).iter().any(|(re, im)| re.hypot(*im) > STANDS);
+        let moved_back = truth.f == filter.f && grows(&filter);
         let layout = Layout::new(gains.epochs.len(), judge.size(), &channels);
         Ok(AxisCourse {
             name: design.name.clone(),
@@ -106,6 +115,7 @@ impl AxisCourse {
             epochs,
             channels,
             layout,
+            moved_back,
             over_time: OnceLock::new(),
         })
     }

@@ -226,6 +226,9 @@ fn simulate(axis: &AxisCourse, mut runs: Runs, scratch: &mut Scratch, mut observ
     while step < axis.gains.steps {
         checkpoint();
         runs.draw(scratch);
+        if axis.moved_back {
+            runs.move_back();
+        }
         let end = (step + CHUNK as u64).min(axis.gains.steps);
         while step < end {
             // up to the next epoch, whose errors are judged

@@ -200,6 +200,14 @@ impl<'a> Runs<'a> {
         let sources = self.process.iter_mut().zip(process).chain(self.noise.iter_mut().zip(noise));
         sources.for_each(|(normals, numbers)| draw(normals, words, numbers));
     }
+
+    /// Truth and estimate by the same way, so that the estimate is zero.
+    pub(super) fn move_back(&mut self) {
+        for (truth, estimate) in self.truth.iter_mut().zip(&mut self.estimate) {
+            truth.iter_mut().zip(estimate.iter()).for_each(|(truth, estimate)| *truth -= estimate);
+            estimate.fill(0.0);
+        }
+    }
 }
 
 fn draw(normals: &mut Normals<LANES>, words: &mut [[u64; LANES]], numbers: &mut Aligned) {

@@ -4,9 +4,8 @@ use super::MonteCarloError;
 use super::course::model_of;
 use crate::filter::FilterDesign;
 use crate::model::LinearModel;
-use crate::numerics::distribution::NORMAL_95;
 use crate::numerics::random::{StreamId, normal, stream};
-use crate::params::{AxisParams, Measured};
+use crate::params::AxisParams;
 
 /// Term part of the stream addresses of drawn parameters, beside those of the runs (in `scratch`).
 const PARAMETERS: u32 = 0x13_0000;
@@ -22,7 +21,7 @@ impl Spread {
     /// Errors: no parameter of the axis has an interval.
     pub(super) fn new(axis: &AxisParams, design: &FilterDesign) -> Result<Spread, MonteCarloError> {
         let mut axis = axis.clone();
-        if axis.noise_parameters().all(|(_, parameter)| log_spread(parameter).is_none()) {
+        if axis.noise_parameters().all(|(_, parameter)| parameter.log_spread().is_none()) {
             return Err(MonteCarloError::NoIntervals { axis: axis.name });
         }
         Ok(Spread { axis, design: FilterDesign { axes: Vec::new(), ..design.clone() } })
@@ -33,7 +32,7 @@ impl Spread {
     pub(super) fn draw(&self, seed: u64, run: u64, number: u32, nominal: &LinearModel) -> LinearModel {
         let mut axis = self.axis.clone();
         for (term, (_, parameter)) in (PARAMETERS..).zip(axis.noise_parameters()) {
-            if let Some(spread) = log_spread(parameter) {
+            if let Some(spread) = parameter.log_spread() {
                 let draw = normal(&mut stream(seed, StreamId { run, axis: number, term }));
                 parameter.value *= (spread * draw).exp();
             }
@@ -43,16 +42,4 @@ impl Spread {
             .filter(|model| model.states == nominal.states)
             .unwrap_or_else(|| nominal.clone())
     }
-}
-
-/// Standard deviation of the logarithm; from the closed side of an interval that is open on the other.
-fn log_spread(parameter: &Measured) -> Option<f64> {
-    let [lower, upper] = parameter.interval?;
-    let below = (lower > 0.0).then(|| (parameter.value / lower).ln());
-    let above = upper.is_finite().then(|| (upper / parameter.value).ln());
-    let width = match (below, above) {
-        (Some(below), Some(above)) => 0.5 * (below + above),
-        (one, other) => one.or(other)?,
-    };
-    Some(width / NORMAL_95).filter(|spread| *spread > 0.0)
 }

@@ -254,6 +254,32 @@ pub fn minimize(problem: &Problem<'_>, start: &[f64], bounds: &[(f64, f64)]) -> 
     best
 }
 
+/// The least value near `start` by steps of `step` along each axis, halved down to `least` while none leads down: kinks and
+/// limits (where f is infinite) do not mislead it. Within `bounds`. Source: Kolda, Lewis and Torczon 2003, SIAM Review
+/// 45(3), compass search.
+pub fn compass(
+    values: impl Fn(&[Vec<f64>]) -> Vec<f64>,
+    start: &[f64],
+    bounds: &[(f64, f64)],
+    mut step: f64,
+    least: f64,
+) -> (Vec<f64>, f64) {
+    let mut x = start.to_vec();
+    let mut f = values(&[x.clone()]).first().copied().unwrap_or(f64::INFINITY);
+    while step >= least {
+        checkpoint();
+        let ways = (0..x.len()).flat_map(|k| [step, -step].map(|by| shifted(&x, &[(k, by)])));
+        let inside = |x: &Vec<f64>| x.iter().zip(bounds).all(|(x, (low, high))| (*low..=*high).contains(x));
+        let ways: Vec<Vec<f64>> = ways.filter(inside).collect();
+        let found = values(&ways).into_iter().zip(ways).min_by(|a, b| a.0.total_cmp(&b.0));
+        match found.filter(|(value, _)| *value < f) {
+            Some((value, next)) => (f, x) = (value, next),
+            None => step *= 0.5,
+        }
+    }
+    (x, f)
+}
+
 /// The matrix of second derivatives ∂²f/∂x_i∂x_k by central differences of these steps; `value` is f(at). `values`
 /// gives f at many points at once.
 pub fn hessian(values: impl Fn(&[Vec<f64>]) -> Vec<f64>, at: &[f64], value: f64, steps: &[f64]) -> DMatrix<f64> {

@@ -8,7 +8,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::amounts::{whole, with_unit};
-use crate::aircraft::flight::{FlightDocument, FlightError, FlightReport, Plan, RowSink, Times, fly};
+use super::closed_loop;
+use crate::aircraft::flight::{FlightError, FlightReport, Plan, RowSink, Times, fly};
 use crate::export::table::TableWriter;
 use crate::report::figure::Envelope;
 use crate::units::Dimension;
@@ -105,7 +106,7 @@ pub fn run(request: &Request, figures: bool) -> anyhow::Result<Done> {
         every: request.every.as_deref().map(|text| time("`every`", text)).transpose()?,
         step: request.step.as_deref().map(|text| time("`step`", text)).transpose()?,
     };
-    let document = FlightDocument::read(&request.flight)?;
+    let document = closed_loop::flight(&request.flight)?;
     let folder = request.flight.parent().unwrap_or(Path::new("."));
     let failed = |error: FlightError| anyhow!("{}: {error}", request.flight.display());
     let plan = Plan::new(&document, folder, &times).map_err(failed)?;

@@ -22,6 +22,7 @@ pub mod airplane;
 pub mod allan;
 pub mod amounts;
 pub mod checked;
+pub mod closed_loop;
 pub mod compare;
 pub mod datasheet;
 pub mod export;

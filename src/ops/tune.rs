@@ -1,5 +1,6 @@
 //! The augmented Kalman filter of noise parameters.
 
+mod airplane;
 pub mod attitude;
 pub mod compare;
 pub mod objective;
@@ -125,7 +126,8 @@ pub struct Linear {
 impl Request {
     /// Files that are read.
     pub fn inputs(&self) -> Vec<&Path> {
-        self.params.iter().chain(&self.log).chain(&self.truth).map(PathBuf::as_path).collect()
+        let given = self.params.iter().chain(&self.log).chain(&self.truth).chain(&self.plant.flight);
+        given.map(PathBuf::as_path).collect()
     }
 }
 
@@ -137,13 +139,19 @@ pub fn run(request: &Request) -> anyhow::Result<Done> {
     let logs = Logs { reading: &request.reading, aids: &request.plant.columns() };
     let params = checked::params(path)?;
     let name = path.display().to_string();
-    let design = request.plant.design(&params)?;
+    let design = if request.plant.is_airplane() { None } else { request.plant.design(&params)? };
     let attitude = design.as_ref().or(params.design.as_ref()).filter(|d| matches!(d.plant, PlantEntry::Attitude(_)));
     if let Some(design) = attitude {
         return Ok(Done::Attitude(Box::new(attitude::run(request, &name, &params, design)?)));
     }
     let options = TuneOptions { design, flicker_horizon_s: request.flicker_horizon };
-    let (mut tuned, record) = chosen(request, &params, &options, &logs).with_context(|| name.clone())?;
+    let (mut params, mut record) = (params, None);
+    let mut tuned;
+    if request.plant.is_airplane() {
+        (params, tuned) = airplane::tuned(request, &params).with_context(|| name.clone())?;
+    } else {
+        (tuned, record) = chosen(request, &params, &options, &logs).with_context(|| name.clone())?;
+    }
     let truth = request.truth.as_deref().map(|path| Truth::read(path, &tuned, &options)).transpose()?;
     let plan = Plan { runs: request.runs, seed: request.seed, ..Plan::quick(params.sample_rate_hz) };
     let insights = if request.insight { insight(&tuned, &options)? } else { Vec::new() };

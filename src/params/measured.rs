@@ -8,6 +8,7 @@ use serde::{Serialize, Serializer};
 use serde_json::Value;
 
 use super::place::{KeyError, Place, describe};
+use crate::numerics::distribution::NORMAL_95;
 use crate::units::{Dimension, LARGEST, Unit};
 
 /// A value with its unit as written and, if known, a 95 % interval in the same unit.
@@ -39,6 +40,18 @@ impl Measured {
     /// The interval in SI.
     pub fn interval_si(&self) -> Option<[f64; 2]> {
         self.interval.map(|i| i.map(|v| self.unit.to_si(v)))
+    }
+    /// Standard deviation of the logarithm by the interval, taken as the 95 % range of a log-normal law; from the closed
+    /// side of one that is open on the other.
+    pub fn log_spread(&self) -> Option<f64> {
+        let [lower, upper] = self.interval?;
+        let below = (lower > 0.0).then(|| (self.value / lower).ln());
+        let above = upper.is_finite().then(|| (upper / self.value).ln());
+        let width = match (below, above) {
+            (Some(below), Some(above)) => 0.5 * (below + above),
+            (one, other) => one.or(other)?,
+        };
+        Some(width / NORMAL_95).filter(|spread| *spread > 0.0)
     }
     /// From SI into `unit`; the interval is SI too.
     pub fn from_si(value: f64, interval: Option<[f64; 2]>, unit: Unit) -> Self {

@@ -12,15 +12,18 @@ use crate::filter::kalman::{Kalman, Update};
 use crate::filter::smoother::History;
 use crate::filter::whole_log::TwoStage;
 use crate::filter::{AxisDesign, Form, Running};
-use crate::model::LinearModel;
+use crate::model::{LinearModel, Named};
 use crate::numerics::reduce::Sum;
 
 /// One axis in progress.
 #[derive(Clone, Debug)]
 pub(super) struct AxisReplay {
     pub(super) filter: Running,
-    /// Last usable value of the input.
-    input: Option<f64>,
+    /// Last usable value of each input; zero before there is one.
+    inputs: Vec<f64>,
+    /// One of them has had a value.
+    driven: bool,
+    about: About,
     pub(super) channels: Vec<Channel>,
     roles: Roles,
     gate: Option<f64>,
@@ -41,6 +44,20 @@ pub(super) struct AxisReplay {
     pub(super) following: Option<Following>,
     /// The same filter for whole stretches of the log, where it can be run so.
     stretches: Option<Stretches>,
+}
+
+/// What is taken off before the filter sees it.
+#[derive(Clone, Debug)]
+struct About {
+    inputs: Vec<f64>,
+    measurements: Vec<f64>,
+}
+
+impl About {
+    fn new(design: &AxisDesign) -> About {
+        let of = |named: &[Named]| named.iter().map(|n| design.about.get(&n.name).copied().unwrap_or(0.0)).collect();
+        About { inputs: of(&design.model.inputs), measurements: of(&design.model.measurements) }
+    }
 }
 
 /// A filter for whole stretches, and its results: ν and 1/S of each sample.
@@ -114,7 +131,9 @@ impl AxisReplay {
                 .map(|filter| Stretches::new(filter, model.r[(0, 0)]));
         AxisReplay {
             filter,
-            input: None,
+            inputs: vec![0.0; model.inputs.len()],
+            driven: false,
+            about: About::new(design),
             channels,
             stretches,
             roles,
@@ -134,7 +153,7 @@ impl AxisReplay {
 
     /// Columns beside the sensor's.
     pub(super) fn aids(&self) -> usize {
-        usize::from(self.roles.known_input) + self.channels.len() - self.roles.own
+        self.roles.known_inputs + self.channels.len() - self.roles.own
     }
 
     /// Rows of a sensor alone, when nothing but the statistics is wanted of them; false where they must go one by one.
@@ -176,7 +195,7 @@ impl AxisReplay {
         {
             self.samples += 1;
             if self.started {
-                self.pass(missing, None);
+                self.pass(missing);
             }
             self.started = true;
             let channel = &mut self.channels[0];
@@ -214,22 +233,27 @@ impl AxisReplay {
             if self.step.is_multiple_of(self.channels[0].every) {
                 if sensor.is_finite() { self.update(0, sensor, time_s) } else { self.channels[0].skip() }
             }
-        } else if sensor.is_finite() {
-            self.input = Some(sensor);
         } else {
-            self.unusable += 1;
+            self.drive(0, sensor);
         }
         self.follow(sensor);
-        if self.roles.known_input {
-            match aids.next().filter(|u| u.is_finite()) {
-                Some(u) => self.input = Some(u),
-                None => self.unusable += 1,
-            }
+        for input in 0..self.roles.known_inputs {
+            self.drive(input, aids.next().unwrap_or(f64::NAN));
         }
         for (index, z) in (self.roles.own..).zip(aids) {
             if z.is_finite() {
                 self.update(index, z, time_s);
             }
+        }
+    }
+
+    /// The value that an input keeps from now on.
+    fn drive(&mut self, input: usize, value: f64) {
+        if value.is_finite() {
+            self.inputs[input] = value - self.about.inputs[input];
+            self.driven = true;
+        } else {
+            self.unusable += 1;
         }
     }
 
@@ -247,7 +271,7 @@ impl AxisReplay {
 
     fn update(&mut self, index: usize, z: f64, time_s: f64) {
         let channel = &mut self.channels[index];
-        let z = channel.nearest(z, self.filter.x());
+        let z = channel.nearest(z - self.about.measurements[index], self.filter.x());
         let update = self.filter.update(index, z, self.gate);
         channel.last = Some(update);
         let y = update.innovation / update.variance.sqrt();
@@ -275,17 +299,18 @@ impl AxisReplay {
     /// Predictions to the next sample, with `missing` samples in between.
     fn advance(&mut self, missing: u64) {
         let steps = missing.saturating_add(1);
-        self.filter.advance(steps, self.input);
+        let inputs = self.driven.then_some(self.inputs.as_slice());
+        self.filter.advance(steps, inputs);
         if let Some(history) = &mut self.history {
-            history.row(steps, self.input);
+            history.row(steps, inputs);
         }
-        self.pass(missing, self.input);
+        self.pass(missing);
     }
 
     /// What is counted of a step, with `missing` samples in between.
-    fn pass(&mut self, missing: u64, input: Option<f64>) {
+    fn pass(&mut self, missing: u64) {
         let steps = missing.saturating_add(1);
-        self.start.predict(steps, input);
+        self.start.predict(steps, self.driven.then_some(self.inputs.as_slice()));
         if missing > 0 {
             self.following.iter_mut().for_each(Following::interrupt);
             self.gaps += 1;
@@ -380,9 +405,9 @@ impl StartTest {
         StartTest { shifted, until, score: 0.0, information: 0.0 }
     }
 
-    fn predict(&mut self, steps: u64, input: Option<f64>) {
+    fn predict(&mut self, steps: u64, inputs: Option<&[f64]>) {
         if let Some(kalman) = &mut self.shifted {
-            kalman.advance(steps, input);
+            kalman.advance(steps, inputs);
         }
     }
 

@@ -21,7 +21,7 @@ use serde::Serialize;
 
 use crate::consistency::{Test, Verdict};
 use crate::filter::smoother::{History, Smoothed, smooth};
-use crate::filter::{AxisDesign, FilterDesign, Form, Running};
+use crate::filter::{AIRPLANE, AxisDesign, FilterDesign, Form, Running};
 use crate::input::{Block, LogReader};
 use crate::model::{LinearModel, Named};
 use crate::numerics::linalg::LinalgError;
@@ -108,13 +108,12 @@ pub struct Aid {
 }
 
 /// What a log must have beside the sensor, axis by axis: an input that is not the sensor, then the measurements that
-/// are not. Errors: a custom plant with several inputs, or one whose design is not told.
+/// are not. Errors: a custom plant whose design is not known.
 pub fn aids(design: &FilterDesign) -> Result<Vec<Aid>, ReplayError> {
     let mut all = Vec::new();
     for axis in &design.axes {
         let roles = Roles::new(design, &axis.model)?;
-        let known = axis.model.inputs.iter().filter(|_| roles.known_input);
-        let beside = known.chain(&axis.model.measurements[roles.own..]);
+        let beside = axis.model.inputs[..roles.known_inputs].iter().chain(&axis.model.measurements[roles.own..]);
         all.extend(beside.map(|named| Aid { axis: axis.name.clone(), measurement: named.clone() }));
     }
     Ok(all)
@@ -125,24 +124,25 @@ pub fn aids(design: &FilterDesign) -> Result<Vec<Aid>, ReplayError> {
 struct Roles {
     /// Measurements that are of the sensor itself: the first, unless the sensor is an input.
     own: usize,
-    /// The input is a column of its own.
-    known_input: bool,
+    /// Inputs that are columns of their own: all, unless the sensor is one.
+    known_inputs: usize,
 }
 
 impl Roles {
     fn new(design: &FilterDesign, model: &LinearModel) -> Result<Roles, ReplayError> {
         let is_input = match design.design.as_ref().map(|design| &design.plant) {
             Some(PlantEntry::Custom(entry)) => model.inputs.iter().any(|input| input.name == entry.sensor),
+            _ if design.plant == AIRPLANE => false,
             _ if design.plant == "custom" && model.inputs.len() + model.measurements.len() > 1 => {
                 return Err(ReplayError::CustomUntold);
             }
             _ => !model.inputs.is_empty(),
         };
-        if model.inputs.len() > 1 {
+        if is_input && model.inputs.len() > 1 {
             let inputs = model.inputs.iter().map(|input| input.name.as_str()).collect::<Vec<_>>().join(", ");
             return Err(ReplayError::Inputs { inputs });
         }
-        Ok(Roles { own: usize::from(!is_input), known_input: !is_input && !model.inputs.is_empty() })
+        Ok(Roles { own: usize::from(!is_input), known_inputs: if is_input { 0 } else { model.inputs.len() } })
     }
 }
 
@@ -174,7 +174,9 @@ pub enum ReplayError {
          write it with tune"
     )]
     CustomUntold,
-    #[error("the plant has the inputs {inputs}; replay handles one, montecarlo judges this filter on simulated runs")]
+    #[error(
+        "the plant has the inputs {inputs}, one of them the sensor; replay then handles no other, montecarlo judges this filter on simulated runs"
+    )]
     Inputs { inputs: String },
     #[error("axis '{axis}': Q and P0 have no square root: {source}")]
     SquareRoot { axis: String, source: LinalgError },

@@ -18,6 +18,8 @@ mod sensor;
 mod under_truth;
 mod walk_price;
 
+use std::collections::BTreeMap;
+
 use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -35,6 +37,7 @@ pub use attitude::{AtRest, TunedAttitude, tune_attitude};
 pub use closed_loop::{Share, bandwidth_hz, error_budget};
 pub use flicker::FlickerApproximation;
 pub use insight::{FACTORS, Insight, MISTAKES, Mistake, Observed, OutputInsight, WHOLE_SENSOR, Worth, insight};
+pub use plant::Joined;
 pub use prediction::{Predicted, predicted_sigma};
 pub use under_truth::{ErrorOverTime, Tendency, UnderTruth, under_truth};
 pub use walk_price::{AidedFilter, SensorDrift, WalkPrice, WalkTrial, shared_walk};
@@ -136,29 +139,32 @@ pub struct Tuned {
 pub fn tune(params: &Params, options: &TuneOptions) -> Result<Tuned, TuneError> {
     let chosen = options.design.clone().or_else(|| params.design.clone()).unwrap_or_default();
     let mut axes = Vec::with_capacity(params.axes.len());
-    let mut reports = Vec::with_capacity(params.axes.len());
     for axis in &params.axes {
-        let (design, report) = tune_axis(axis, params.quantity, params.sample_rate_hz, &chosen, options)?;
-        axes.push(design);
-        reports.push(report);
+        axes.push(tune_axis(axis, params.quantity, params.sample_rate_hz, &chosen, options)?);
     }
-    let decisions: Vec<_> = reports.iter().map(|r| json!({ "axis": r.name, "decisions": r.warnings })).collect();
-    let mut tuning = json!({
-        "method": "exact discretisation of the documented noise terms; nothing is fitted",
-        "objective": "nominal",
-        "criterion": "least mean square error of every state",
-        "axes": decisions,
-    });
-    record_check(params, &mut tuning);
-    let design = FilterDesign {
-        quantity: params.quantity,
-        sample_rate_hz: params.sample_rate_hz,
-        plant: chosen.plant.name().to_string(),
-        design: Some(chosen).filter(|chosen| *chosen != Design::default()),
+    Ok(Tuned::new(
+        params,
+        chosen.plant.name(),
+        Some(chosen.clone()).filter(|chosen| *chosen != Design::default()),
         axes,
-        tuning,
-    };
-    Ok(Tuned { design, reports })
+    ))
+}
+
+impl Tuned {
+    /// The axes as one design, with the record of how it was made. `plant` and `design`: as in [`FilterDesign`].
+    pub fn new(params: &Params, plant: &str, design: Option<Design>, axes: Vec<(AxisDesign, AxisReport)>) -> Tuned {
+        let (axes, reports): (Vec<AxisDesign>, Vec<AxisReport>) = axes.into_iter().unzip();
+        let decisions: Vec<_> = reports.iter().map(|r| json!({ "axis": r.name, "decisions": r.warnings })).collect();
+        let mut tuning = json!({
+            "method": "exact discretisation of the documented noise terms; nothing is fitted",
+            "objective": "nominal",
+            "criterion": "least mean square error of every state",
+            "axes": decisions,
+        });
+        record_check(params, &mut tuning);
+        let (quantity, sample_rate_hz) = (params.quantity, params.sample_rate_hz);
+        Tuned { design: FilterDesign { quantity, sample_rate_hz, plant: plant.into(), design, axes, tuning }, reports }
+    }
 }
 
 /// Key of the record of the tuning: what check the log behind the parameters has failed.
@@ -208,6 +214,12 @@ fn tune_axis(
     if chosen.plant.name() == "static" {
         sensor.warnings.extend(lost_in_double(&sensor.model, quantity));
     }
+    designed(axis, sensor)
+}
+
+/// The filter of a model of the sensor `axis` in its plant, and what it promises. Errors: a model without a steady
+/// state.
+pub fn designed(axis: &AxisParams, sensor: Joined) -> Result<(AxisDesign, AxisReport), TuneError> {
     let steady =
         steady_state(&sensor.model).map_err(|source| TuneError::SteadyState { axis: axis.name.clone(), source })?;
     let failed = |source: LinalgError| TuneError::Linalg { axis: axis.name.clone(), source };
@@ -237,7 +249,13 @@ fn tune_axis(
         flicker: sensor.flicker,
         warnings: sensor.warnings,
     };
-    let design = AxisDesign { name: axis.name.clone(), model: sensor.model, steady_state: steady, noise: axis.clone() };
+    let design = AxisDesign {
+        name: axis.name.clone(),
+        model: sensor.model,
+        steady_state: steady,
+        noise: axis.clone(),
+        about: BTreeMap::new(),
+    };
     Ok((design, report))
 }
 

@@ -19,12 +19,12 @@ const ANY_RATE: f64 = 100.0 * std::f64::consts::PI / 180.0;
 
 /// A plant joined with its sensors, and the decisions that led to it.
 #[derive(Clone, Debug)]
-pub(super) struct Joined {
-    pub(super) model: LinearModel,
+pub struct Joined {
+    pub model: LinearModel,
     /// Process noise with names of its own.
-    pub(super) noise: Vec<(String, DMatrix<f64>)>,
-    pub(super) flicker: Option<FlickerApproximation>,
-    pub(super) warnings: Vec<String>,
+    pub noise: Vec<(String, DMatrix<f64>)>,
+    pub flicker: Option<FlickerApproximation>,
+    pub warnings: Vec<String>,
 }
 
 /// A sensor that is joined to the plant.

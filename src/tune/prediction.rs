@@ -9,6 +9,7 @@ use crate::filter::Cycle;
 use crate::model::LinearModel;
 use crate::numerics::linalg::{LinalgError, solve_spd, symmetrise};
 use crate::numerics::optimize::bisect;
+use crate::numerics::riccati::Flow;
 
 /// Points per decade of time.
 const PER_DECADE: i32 = 8;
@@ -80,7 +81,9 @@ pub(super) fn covariances(model: &LinearModel, steps: &[u64]) -> Result<Vec<DMat
     let mut result = Vec::with_capacity(steps.len());
     for &count in steps {
         let (whole, rest) = (count / cycle.period, count % cycle.period);
-        let mut p = model.p0.clone();
+        // flows are joined, and P0 goes through them at once: of a plant that runs away, what is left of P after a long
+        // flow is not positive definite to the last bit
+        let mut flow = Flow::none(model.states.len());
         for bit in 0..u64::BITS - whole.leading_zeros() {
             while powers.len() <= bit as usize {
                 let mut next = powers[powers.len() - 1].clone();
@@ -88,13 +91,13 @@ pub(super) fn covariances(model: &LinearModel, steps: &[u64]) -> Result<Vec<DMat
                 powers.push(next);
             }
             if whole >> bit & 1 == 1 {
-                p = powers[bit as usize].apply(&p)?;
+                flow = flow.then(&powers[bit as usize])?;
             }
         }
         if rest > 0 {
-            p = cycle.flow_of(model, rest)?.apply(&p)?;
+            flow = flow.then(&cycle.flow_of(model, rest)?)?;
         }
-        result.push(updated(model, &cycle.taken(rest), p)?);
+        result.push(updated(model, &cycle.taken(rest), flow.apply(&model.p0)?)?);
     }
     Ok(result)
 }

@@ -65,7 +65,7 @@ fn answer<'a>(params: &Params, axes: &[IdentifiedAxis]) -> Section<'a> {
     let density = bias.times_time(1);
     let row = |found: &Identified| {
         let white = Some(found.model.wideband_density()).filter(|density| *density > 0.0);
-        let precise = found.precision.iter().find(|p| p.parameter == "white.density");
+        let precise = found.precision.iter().find(|p| p.parameter == "white.density" && p.std_dev_percent.is_finite());
         [
             found.params.name.clone(),
             or_dash_three(white.map(|si| density.from_si(si))),

@@ -6,6 +6,7 @@
 pub mod airplane;
 pub mod allan;
 mod answer;
+pub mod closed_loop;
 pub mod compare;
 pub mod export;
 pub mod fly;

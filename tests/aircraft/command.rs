@@ -126,7 +126,7 @@ fn what_cannot_be_flown_is_refused_in_one_line() {
         (trim("1000 m", "25 m/s"), "", &["gusts[0]", "1000 m (3281 ft)", "needs std_dev", "or exceedance"]),
         (dryden(json!({ "exceedance": 0.3 })), "", &["gusts[0]: exceedance 0.3", "curves for"]),
         (dryden(json!({ "exceedance": 1e-3, "std_dev": "1 m/s" })), "", &["gusts.exceedance", "beside std_dev"]),
-        (pilot(json!({ "gains": null })), "", &["autopilot: expected one of gains and lqr"]),
+        (pilot(json!({ "gains": null })), "", &["autopilot: expected one of gains, lqr and rule"]),
         (
             pilot(json!({ "gains": null, "lqr": lqr(json!([1, 1, 1]), 1) })),
             "",

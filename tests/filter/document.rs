@@ -21,7 +21,13 @@ fn axis(name: &str, model: LinearModel) -> AxisDesign {
         ],
         not_identified: vec![],
     };
-    AxisDesign { name: name.into(), steady_state: steady_state(&model).unwrap(), model, noise }
+    AxisDesign {
+        name: name.into(),
+        steady_state: steady_state(&model).unwrap(),
+        model,
+        noise,
+        about: Default::default(),
+    }
 }
 
 fn design() -> FilterDesign {

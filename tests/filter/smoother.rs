@@ -74,7 +74,7 @@ fn equals_batch_least_squares() {
                 continue;
             }
             let steps = if k == 32 && u.is_empty() { 13 } else { u64::from(k > 0) };
-            history.row(steps, u.first().filter(|_| k > 0).map(|u| u[k - 1]));
+            history.row(steps, u.first().filter(|_| k > 0).map(|u| &u[k - 1..k]));
             for (i, z) in z.iter().enumerate().filter(|(i, z)| k % m.every[*i] == 0 && !z[k].is_nan()) {
                 history.take(i, z[k]);
             }

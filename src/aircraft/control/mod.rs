@@ -2,4 +2,6 @@
 
 pub mod controllability;
 pub mod document;
+pub mod margins;
 pub mod regulator;
+pub mod response;

@@ -3,7 +3,13 @@
 //! Every number stands with its unit. `read` makes the document of a text; the structs here are its layout and its
 //! schema.
 
+pub mod criteria;
+pub mod feeds;
+mod optimize;
 mod read;
+mod rule;
+mod uncertainty;
+mod values;
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -11,6 +17,11 @@ use std::path::{Path, PathBuf};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Serialize;
 
+pub use self::criteria::CriteriaEntry;
+pub use self::feeds::{FeedEntry, LowpassEntry};
+pub use self::optimize::OptimizeEntry;
+pub use self::rule::RuleEntry;
+pub use self::uncertainty::UncertaintyEntry;
 use crate::aircraft::airframe::AirplaneDocument;
 use crate::aircraft::airframe::trim::{Sideways, TrimRequest, Turn};
 use crate::aircraft::atmosphere::discrete::Form;
@@ -58,6 +69,18 @@ pub struct FlightDocument {
     pub sensors: SensorsEntry,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub autopilot: Option<AutopilotEntry>,
+    /// What `loop` compares: what stands between the sensors and the gains; each has a name of its own.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub feeds: Vec<FeedEntry>,
+    /// What every feed must keep.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub criteria: Option<CriteriaEntry>,
+    /// How well the airframe is known, for `spread` of `loop`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uncertainty: Option<UncertaintyEntry>,
+    /// What `loop` with `optimize` makes least; the usual when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub optimize: Option<OptimizeEntry>,
 }
 
 /// Another document: a path, from the folder of this one, or the document itself.
@@ -312,10 +335,10 @@ pub struct GnssEntry {
     pub rate: Option<Measured>,
 }
 
-/// One law, `gains` or `lqr`; both work on deviations from the trim.
+/// One law, `gains` (or a `rule` for them) or `lqr`; both work on deviations from the trim.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(extend("oneOf" = [{ "required": ["gains"] }, { "required": ["lqr"] }]))]
+#[schemars(extend("oneOf" = [{ "required": ["gains"] }, { "required": ["lqr"] }, { "required": ["rule"] }]))]
 pub struct AutopilotEntry {
     pub rate: Measured,
     /// Whole samples from the measurement to the command at the servo; 1 when absent.
@@ -326,6 +349,9 @@ pub struct AutopilotEntry {
     pub gains: Option<GainsEntry>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lqr: Option<LqrEntry>,
+    /// Instead of gains: what they are to do.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rule: Option<RuleEntry>,
     /// Time constant of the complementary filter of gyro and attitude reference; 5 s when absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub attitude_filter: Option<Measured>,
@@ -383,7 +409,22 @@ pub struct GainsEntry {
     pub washout: Option<Measured>,
 }
 
+impl AutopilotEntry {
+    /// s.
+    pub fn attitude_filter_s(&self) -> f64 {
+        self.attitude_filter.as_ref().map_or(5.0, Measured::si)
+    }
+}
+
 impl FlightDocument {
+    /// Of the first turbulence, m/s.
+    pub fn wind_at_20ft(&self) -> Option<f64> {
+        self.gusts.iter().find_map(|gust| match gust {
+            GustEntry::Dryden { wind_at_20ft, .. } => wind_at_20ft.as_ref().map(Measured::si),
+            GustEntry::Discrete { .. } => None,
+        })
+    }
+
     /// Every complaint names `path` and the key.
     pub fn from_json(text: &str, path: &str) -> Result<FlightDocument, DocumentError> {
         place::document(text, path, read::flight)

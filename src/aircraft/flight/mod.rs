@@ -15,6 +15,7 @@ mod rows;
 mod run;
 mod sensors;
 pub mod servo;
+pub mod setting;
 mod start;
 mod streams;
 mod surfaces;
@@ -23,6 +24,9 @@ mod vector;
 pub use document::FlightDocument;
 pub use plan::{Plan, STEP, Times};
 pub use report::{ColumnReport, FlightReport, RowSink, RunReport, fly};
+pub use run::{Commander, Seen, Truth};
+pub use sensors::three_axes;
+pub use setting::Setting;
 
 /// A flight that cannot be flown: one clear line.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

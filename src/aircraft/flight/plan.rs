@@ -15,7 +15,7 @@ use super::start::{self, Start};
 use super::surfaces::CONTROLS;
 use super::vector::{Vector, dot, matrix, times};
 use crate::aircraft::airframe::Airplane;
-use crate::aircraft::airframe::linear::LinearModel;
+use crate::aircraft::airframe::linear::{LinearModel, LinearModels};
 use crate::aircraft::atmosphere::discrete::DiscreteGust;
 use crate::aircraft::atmosphere::dryden::{Dryden, Intensity};
 use crate::aircraft::atmosphere::{AirError, exceedance, standard};
@@ -186,6 +186,13 @@ impl Plan {
         Ok(plan)
     }
 
+    /// The gyro without its constant bias: what it does is an offset, which needs no flights.
+    #[must_use]
+    pub fn without_bias(mut self) -> Plan {
+        self.sensors.gyro.iter_mut().flat_map(|gyro| &mut gyro.axes).for_each(|axis| axis.bias = None);
+        self
+    }
+
     pub(super) fn world(&self) -> World<'_> {
         World::new(&self.airplane, self.earth, self.wind)
     }
@@ -205,7 +212,7 @@ impl Plan {
     }
 }
 
-fn gusts(
+pub(super) fn gusts(
     document: &FlightDocument,
     above_ground: f64,
     speed: f64,
@@ -303,14 +310,14 @@ fn autopilot(
             washout: gains.washout.as_ref().map_or(1.0, Measured::si),
         }),
         (None, Some(lqr)) => Law::Regulator(state_feedback(lqr, document, airplane).map_err(at("autopilot.lqr"))?),
-        (None, None) => return Err(FlightError("autopilot: expected one of gains and lqr".into())),
+        (None, None) => return Err(FlightError("autopilot: expected one of gains, lqr and rule".into())),
     };
     Ok(Some(AutopilotPlan {
         law,
         reference,
         every,
         delay: entry.delay as f64 / rate,
-        filter: measured.then(|| entry.attitude_filter.as_ref().map_or(5.0, Measured::si)),
+        filter: measured.then(|| entry.attitude_filter_s()),
     }))
 }
 
@@ -318,7 +325,13 @@ fn autopilot(
 fn state_feedback(lqr: &LqrEntry, document: &FlightDocument, airplane: &Airplane) -> Result<StateFeedback, String> {
     let entry = document.trim.as_ref().ok_or("needs a trim, about which its gains are made; give trim too")?;
     let trim = start::trim(entry, airplane).map_err(|e| e.to_string())?;
-    let models = airplane.linear(&trim);
+    let [along, across] = optimal_gains(lqr, &airplane.linear(&trim))?;
+    let row = |gain: &DMatrix<f64>, i: usize| std::array::from_fn(|j| gain[(i, j)]);
+    Ok(StateFeedback { along: row(&along, 0), across: [row(&across, 0), row(&across, 1)], velocity: trim.velocity })
+}
+
+/// Of the longitudinal and of the lateral states. Errors: there are none for these weights.
+pub(super) fn optimal_gains(lqr: &LqrEntry, models: &LinearModels) -> Result<[DMatrix<f64>; 2], String> {
     let diagonal = |weights: &[f64]| DMatrix::from_diagonal(&DVector::from_column_slice(weights));
     let gain = |model: &LinearModel, inputs: &[&str], states: &[f64; 4], weights: &[f64]| {
         let columns: Vec<usize> = (0..model.inputs.len()).filter(|i| inputs.contains(&model.inputs[*i].0)).collect();
@@ -327,10 +340,10 @@ fn state_feedback(lqr: &LqrEntry, document: &FlightDocument, airplane: &Airplane
             .map_err(|e| format!("no optimal gains of the {} motion: {e}; give other weights", model.name))
     };
     let (x, y) = (&lqr.longitudinal, &lqr.lateral);
-    let along = gain(&models.longitudinal, &["elevator"], &x.states, &[x.elevator])?;
-    let across = gain(&models.lateral, &["aileron", "rudder"], &y.states, &[y.aileron, y.rudder])?;
-    let row = |gain: &DMatrix<f64>, i: usize| std::array::from_fn(|j| gain[(i, j)]);
-    Ok(StateFeedback { along: row(&along, 0), across: [row(&across, 0), row(&across, 1)], velocity: trim.velocity })
+    Ok([
+        gain(&models.longitudinal, &["elevator"], &x.states, &[x.elevator])?,
+        gain(&models.lateral, &["aileron", "rudder"], &y.states, &[y.aileron, y.rudder])?,
+    ])
 }
 
 /// Where a point of the airplane is and how it moves, north, east, down from the start.

@@ -22,7 +22,7 @@ const BODY: [(&str, &str); 6] =
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Measured {
     /// The true attitude.
-    euler: Vector,
+    pub euler: Vector,
     pub gyro: Vector,
     pub attitude: Vector,
     accelerometer: Vector,
@@ -184,6 +184,7 @@ pub(super) fn header(plan: &Plan) -> Vec<String> {
         }
     }
     names.extend(SURFACES.iter().map(|name| format!("{name}_rate (rad/s)")));
+    names.extend(SURFACES.iter().map(|name| format!("{name}_command (rad)")));
     names
 }
 
@@ -239,4 +240,5 @@ pub(super) fn row(
         }
     }
     row.extend(surfaces.rates());
+    row.extend(surfaces.commands());
 }

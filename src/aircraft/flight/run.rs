@@ -3,9 +3,9 @@
 use super::FlightError;
 use super::air::MovingAir;
 use super::autopilot::Autopilot;
-use super::motion::{Rate, State, World, attitude, position, step};
+use super::motion::{Instant, Rate, State, World, attitude, inertial_rate, position, step};
 use super::plan::Plan;
-use super::rows::{self, Measurements};
+use super::rows::{self, Measured, Measurements};
 use super::start::servo_of;
 use super::surfaces::{Surface, Surfaces};
 use super::vector::to_euler;
@@ -42,40 +42,46 @@ impl Plan {
         mut hand_out: impl FnMut(&[f64]) -> Result<(), E>,
     ) -> Result<(), E> {
         let mut flying = Flying::new(self, seed, run)?;
-        let mut measurements = Measurements::new(self, seed, run)?;
-        let mut row = Vec::new();
         let euler = flying.euler();
         let mut autopilot = self.autopilot.map(|a| {
             Autopilot::new(a.law, a.reference, a.every as f64 / self.grid.rate, a.filter, [euler[0], euler[1]])
         });
-        for sample in 0..=self.grid.samples {
-            let time = sample as f64 / self.grid.rate;
-            flying.surfaces.receive(time);
-            flying.air.begin(time, flying.x[13]);
-            let gust = flying.air.gust(0.0, flying.x[13]);
-            let density = flying.density(time)?;
-            let controls = flying.surfaces.controls();
-            let instant = flying.world.instant(&flying.x, &controls, &gust, &density);
-            flying.known = Some((controls, instant.derivative));
-            let measured = measurements.take(self, sample, &flying.x, &instant);
-            if let (Some(autopilot), Some(plan)) = (&mut autopilot, &self.autopilot)
-                && sample.is_multiple_of(plan.every)
-            {
-                let angles = [measured.attitude[0], measured.attitude[1]];
-                let command = autopilot.command(measured.gyro, angles, flying.world.through_air(&flying.x));
-                for (surface, command) in flying.surfaces.0.iter_mut().zip(command) {
-                    surface.order(time + plan.delay, command);
-                }
-            }
-            if sample.is_multiple_of(self.grid.row) || sample == self.grid.samples {
-                rows::row(&mut row, self, time, (&flying.x, &instant), &flying.surfaces, &gust, &measured);
+        let commander = autopilot.as_mut().map(|autopilot| autopilot as &mut dyn Commander);
+        let mut row = Vec::new();
+        flying.samples(seed, run, commander, |flying, sample| {
+            if sample.number.is_multiple_of(self.grid.row) || sample.number == self.grid.samples {
+                let (instant, gust, measured) = (&sample.instant, &sample.gust, &sample.measured);
+                rows::row(&mut row, self, sample.time, (&flying.x, instant), &flying.surfaces, gust, measured);
                 hand_out(&row)?;
             }
-            if sample < self.grid.samples {
-                flying.advance(sample)?;
-            }
+            Ok(())
+        })
+    }
+
+    /// Flies run number `run` by the commands of `commander` instead of the document's autopilot, with its rate and delay;
+    /// `look` sees every sample. Errors: as of a flight; the document has no autopilot.
+    pub fn fly_by(
+        &self,
+        seed: u64,
+        run: u64,
+        commander: &mut dyn Commander,
+        mut look: impl FnMut(f64, &Truth),
+    ) -> Result<(), FlightError> {
+        if self.autopilot.is_none() {
+            return Err(FlightError("autopilot: missing; give its rate and delay".into()));
         }
-        Ok(())
+        let mut flying = Flying::new(self, seed, run)?;
+        flying.samples(seed, run, Some(commander), |flying, sample| {
+            let truth = Truth {
+                velocity: flying.world.through_air(&flying.x),
+                rate: inertial_rate(&flying.x),
+                angles: [sample.measured.euler[0], sample.measured.euler[1]],
+                surfaces: flying.surfaces.angles(),
+                surface_rates: flying.surfaces.rates(),
+            };
+            look(sample.time, &truth);
+            Ok(())
+        })
     }
 
     /// About the start. Errors: outside the standard atmosphere.
@@ -117,7 +123,86 @@ impl Plan {
     }
 }
 
+/// What a commander sees of one sample: rates of the gyro (rad/s), roll and pitch (rad) of the attitude reference, NaN
+/// where they were not measured, and the true velocity through the steady air (m/s).
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    pub rate: [f64; 3],
+    pub angles: [f64; 2],
+    pub velocity: [f64; 3],
+}
+
+/// Who moves the surfaces.
+pub trait Commander {
+    /// Elevator, aileron, rudder, rad.
+    fn command(&mut self, seen: &Seen) -> [f64; 3];
+}
+
+impl Commander for Autopilot {
+    fn command(&mut self, seen: &Seen) -> [f64; 3] {
+        Autopilot::command(self, seen.rate, seen.angles, seen.velocity)
+    }
+}
+
+/// How it is at one sample, SI: velocity through the steady air, rate against inertial space, roll and pitch, elevator,
+/// aileron and rudder with their rates.
+#[derive(Clone, Copy, Debug)]
+pub struct Truth {
+    pub velocity: [f64; 3],
+    pub rate: [f64; 3],
+    pub angles: [f64; 2],
+    pub surfaces: [f64; 3],
+    pub surface_rates: [f64; 3],
+}
+
+/// One sample of a flight.
+struct Sample {
+    number: u64,
+    time: f64,
+    instant: Instant,
+    gust: Gust,
+    measured: Measured,
+}
+
 impl<'a> Flying<'a> {
+    /// From the first sample to the last, each handed to `at` after its command was given.
+    fn samples<E: From<FlightError>>(
+        &mut self,
+        seed: u64,
+        run: u64,
+        mut commander: Option<&mut dyn Commander>,
+        mut at: impl FnMut(&Self, &Sample) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let plan = self.plan;
+        let mut measurements = Measurements::new(plan, seed, run)?;
+        for number in 0..=plan.grid.samples {
+            let time = number as f64 / plan.grid.rate;
+            self.surfaces.receive(time);
+            self.air.begin(time, self.x[13]);
+            let gust = self.air.gust(0.0, self.x[13]);
+            let density = self.density(time)?;
+            let controls = self.surfaces.controls();
+            let instant = self.world.instant(&self.x, &controls, &gust, &density);
+            self.known = Some((controls, instant.derivative));
+            let measured = measurements.take(plan, number, &self.x, &instant);
+            if let (Some(commander), Some(autopilot)) = (commander.as_deref_mut(), &plan.autopilot)
+                && number.is_multiple_of(autopilot.every)
+            {
+                let angles = [measured.attitude[0], measured.attitude[1]];
+                let velocity = self.world.through_air(&self.x);
+                let command = commander.command(&Seen { rate: measured.gyro, angles, velocity });
+                for (surface, command) in self.surfaces.0.iter_mut().zip(command) {
+                    surface.order(time + autopilot.delay, command);
+                }
+            }
+            at(self, &Sample { number, time, instant, gust, measured })?;
+            if number < plan.grid.samples {
+                self.advance(number)?;
+            }
+        }
+        Ok(())
+    }
+
     fn new(plan: &'a Plan, seed: u64, run: u64) -> Result<Flying<'a>, FlightError> {
         let commands = plan.initial_commands();
         let surface = |i: usize| {

@@ -129,7 +129,7 @@ impl Inertial {
 }
 
 /// The dimension of a density is the quantity's times √s.
-pub(super) fn three_axes(mut params: Params, dimension: Dimension, what: &str) -> Result<Params, String> {
+pub fn three_axes(mut params: Params, dimension: Dimension, what: &str) -> Result<Params, String> {
     if params.quantity.dimension() != dimension {
         return Err(format!("its quantity is {}, expected that of {what}", params.quantity.name()));
     }

@@ -82,7 +82,16 @@ impl Surfaces {
         Controls { elevator, aileron, rudder, throttle }
     }
 
+    pub(super) fn angles(&self) -> [f64; 3] {
+        [0, 1, 2].map(|i| self.0[i].state.angle)
+    }
+
     pub(super) fn rates(&self) -> [f64; 3] {
         [0, 1, 2].map(|i| self.0[i].state.rate)
+    }
+
+    /// The last commands that were given, on their way or there.
+    pub(super) fn commands(&self) -> [f64; 3] {
+        [0, 1, 2].map(|i| self.0[i].pending.back().map_or(self.0[i].command, |(_, command)| *command))
     }
 }

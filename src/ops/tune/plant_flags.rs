@@ -6,6 +6,7 @@ use anyhow::{Context, anyhow, bail};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::filter::AIRPLANE;
 use crate::ops::checked;
 use crate::params::{
     AidDrift, AidEntry, AttitudeEntry, AxisParams, Design, Measured, MotionEntry, Params, PlantEntry, check_name,
@@ -18,8 +19,8 @@ use crate::units::{Dimension, Quantity};
 #[serde(deny_unknown_fields, default)]
 #[command(next_help_heading = "Plant")]
 pub struct PlantFlags {
-    /// What the sensor is part of: static, angle, rate, vertical, attitude, or a design FILE.json [default: the
-    /// design of the parameters, else static]
+    /// What the sensor is part of: static, angle, rate, vertical, attitude, airplane, or a design FILE.json [default:
+    /// the design of the parameters, else static]
     #[arg(long, value_name = "PLANT")]
     pub plant: Option<String>,
     #[allow(rustdoc::broken_intra_doc_links, reason = "it is the help of a flag, too")]
@@ -35,9 +36,17 @@ pub struct PlantFlags {
     /// attitude takes the noisiest
     #[arg(long, value_name = "PARAMS")]
     pub accelerometer: Option<String>,
+    /// Plant airplane: the flight.json whose airplane, servos, gusts and autopilot the filter knows
+    #[arg(long, value_name = "FLIGHT")]
+    pub flight: Option<PathBuf>,
 }
 
 impl PlantFlags {
+    /// The filter is made of a flight.
+    pub(crate) fn is_airplane(&self) -> bool {
+        self.plant.as_deref() == Some(AIRPLANE)
+    }
+
     /// The aids that are columns of logs: NAME=COLUMN.
     pub(crate) fn columns(&self) -> Vec<String> {
         self.aid.iter().filter(|text| text.contains('=')).cloned().collect()
@@ -46,6 +55,9 @@ impl PlantFlags {
     /// `None`: no flag was given, the parameters decide.
     pub(crate) fn design(&self, params: &Params) -> anyhow::Result<Option<Design>> {
         let aids: Vec<&String> = self.aid.iter().filter(|text| !text.contains('=')).collect();
+        if self.flight.is_some() {
+            bail!("`flight` belongs to `plant` airplane");
+        }
         let nothing = self.plant.is_none() && aids.is_empty() && self.motion.is_none();
         if nothing && self.accelerometer.is_none() {
             return Ok(None);

@@ -7,6 +7,7 @@
 mod allan;
 mod budget;
 mod chart;
+mod closed_loop;
 mod consistency;
 mod error;
 mod flight;
@@ -20,6 +21,7 @@ mod worth;
 
 pub use allan::{Allan, AllanPoint, allan};
 pub use budget::{BudgetItem, error_budget};
+pub use closed_loop::{Found, Nyquist, OverLog, found, nyquist, over_log};
 pub use consistency::{
     Autocorrelation, Histogram, Nees, Periodogram, autocorrelation, cumulative_periodogram, nees, nis_histogram,
 };

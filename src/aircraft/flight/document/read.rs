@@ -4,10 +4,11 @@ use std::path::PathBuf;
 
 use serde_json::Value;
 
+use super::values::{ANGLE, LENGTH, RATE, VELOCITY, linked, required, value, word};
 use super::{
     AutopilotEntry, ControlsEntry, DriftEntry, EarthEntry, ErrorEntry, FORMAT, FlightDocument, GainsEntry, GnssEntry,
-    GustEntry, InitialEntry, LateralWeights, Linked, LongitudinalWeights, LqrEntry, PlaceEntry, SensorsEntry,
-    TrimEntry, WindEntry,
+    GustEntry, InitialEntry, LateralWeights, LongitudinalWeights, LqrEntry, PlaceEntry, SensorsEntry, TrimEntry,
+    WindEntry, criteria, feeds, optimize, rule, uncertainty,
 };
 use crate::aircraft::atmosphere::discrete::Form;
 use crate::aircraft::atmosphere::dryden::Specification;
@@ -15,41 +16,7 @@ use crate::params::place::{KeyError, Object, Place};
 use crate::params::{Measured, Range};
 use crate::units::Dimension;
 
-pub(super) const ANGLE: Dimension = Dimension::new(2, 0, 0);
-const RATE: Dimension = Dimension::new(2, 0, -2);
-const LENGTH: Dimension = Dimension::new(0, 2, 0);
-const VELOCITY: Dimension = Dimension::new(0, 2, -2);
 const LATERAL: [&str; 3] = ["zero_sideslip", "zero_side_force", "wings_level"];
-
-/// A value of this dimension, if the key is there.
-fn value(object: &Object<'_>, key: &str, dimension: Dimension, range: Range) -> Result<Option<Measured>, KeyError> {
-    object.optional(key).map(|place| Measured::from_place(&place, dimension, range)).transpose()
-}
-
-fn required(object: &Object<'_>, key: &str, dimension: Dimension) -> Result<Measured, KeyError> {
-    let place = object.required(key).map_err(|error| KeyError {
-        message: format!("missing; write it with its unit, for example \"10 {}\"", dimension.example()),
-        ..error
-    })?;
-    Measured::from_place(&place, dimension, Range::Positive)
-}
-
-fn linked(place: &Place<'_>) -> Result<Linked, KeyError> {
-    match place.value() {
-        Value::String(path) => Ok(Linked::Path(PathBuf::from(path))),
-        Value::Object(_) => Ok(Linked::Document(place.value().clone())),
-        _ => Err(place.error("expected the path of a document, or the document itself")),
-    }
-}
-
-/// One of these words.
-fn word<'a>(place: &Place<'a>, known: &[&str]) -> Result<&'a str, KeyError> {
-    let text = place.text()?;
-    if known.contains(&text) {
-        return Ok(text);
-    }
-    Err(place.error(format!("'{text}' is not known; known are {}", known.join(", "))))
-}
 
 pub(super) fn flight(place: &Place<'_>) -> Result<FlightDocument, KeyError> {
     let known = [
@@ -64,9 +31,14 @@ pub(super) fn flight(place: &Place<'_>) -> Result<FlightDocument, KeyError> {
         "gusts",
         "sensors",
         "autopilot",
+        "feeds",
+        "criteria",
+        "uncertainty",
+        "optimize",
     ];
     let o = place.document(FORMAT, "flight.json", &known)?;
     let many = |place: Place<'_>| place.one_or_many()?.iter().map(gust).collect::<Result<Vec<_>, _>>();
+    let feeds = o.optional("feeds").map(|p| feeds::feeds(&p)).transpose()?.unwrap_or_default();
     Ok(FlightDocument {
         format: FORMAT.into(),
         airplane: linked(&o.required("airplane")?)?,
@@ -79,6 +51,10 @@ pub(super) fn flight(place: &Place<'_>) -> Result<FlightDocument, KeyError> {
         gusts: o.optional("gusts").map(many).transpose()?.unwrap_or_default(),
         sensors: o.optional("sensors").map(|p| sensors(&p)).transpose()?.unwrap_or_default(),
         autopilot: o.optional("autopilot").map(|p| autopilot(&p)).transpose()?,
+        criteria: o.optional("criteria").map(|p| criteria::criteria(&p)).transpose()?,
+        feeds,
+        uncertainty: o.optional("uncertainty").map(|p| uncertainty::uncertainty(&p)).transpose()?,
+        optimize: o.optional("optimize").map(|p| optimize::optimize(&p)).transpose()?,
     })
 }
 
@@ -278,16 +254,17 @@ fn errors(place: &Place<'_>, dimension: Dimension) -> Result<ErrorEntry, KeyErro
 }
 
 fn autopilot(place: &Place<'_>) -> Result<AutopilotEntry, KeyError> {
-    let o = place.object(&["rate", "delay", "gains", "lqr", "attitude_filter", "pitch", "bank"])?;
-    let (of_gains, of_lqr) = (o.optional("gains"), o.optional("lqr"));
-    if of_gains.is_some() == of_lqr.is_some() {
-        return Err(place.error("expected one of gains and lqr, by which the surfaces move"));
+    let o = place.object(&["rate", "delay", "gains", "lqr", "rule", "attitude_filter", "pitch", "bank"])?;
+    let (of_gains, of_lqr, of_rule) = (o.optional("gains"), o.optional("lqr"), o.optional("rule"));
+    if [&of_gains, &of_lqr, &of_rule].into_iter().flatten().count() != 1 {
+        return Err(place.error("expected one of gains, lqr and rule, by which the surfaces move"));
     }
     Ok(AutopilotEntry {
         rate: required(&o, "rate", Dimension::FREQUENCY)?,
         delay: o.optional("delay").map(|p| samples(&p)).transpose()?.unwrap_or(1),
         gains: of_gains.map(|p| gains(&p)).transpose()?,
         lqr: of_lqr.map(|p| lqr(&p)).transpose()?,
+        rule: of_rule.map(|p| rule::rule(&p)).transpose()?,
         attitude_filter: value(&o, "attitude_filter", Dimension::TIME, Range::Positive)?,
         pitch: value(&o, "pitch", ANGLE, Range::Any)?,
         bank: value(&o, "bank", ANGLE, Range::Any)?,
@@ -307,18 +284,23 @@ fn samples(place: &Place<'_>) -> Result<u64, KeyError> {
 
 fn lqr(place: &Place<'_>) -> Result<LqrEntry, KeyError> {
     let o = place.object(&["longitudinal", "lateral"])?;
-    let along = o.required("longitudinal")?.object(&["states", "elevator"])?;
-    let across = o.required("lateral")?.object(&["states", "aileron", "rudder"])?;
     Ok(LqrEntry {
-        longitudinal: LongitudinalWeights {
-            states: state_weights(&along, "u, w, q, theta")?,
-            elevator: input_weight(&along, "elevator")?,
-        },
-        lateral: LateralWeights {
-            states: state_weights(&across, "v, p, r, phi")?,
-            aileron: input_weight(&across, "aileron")?,
-            rudder: input_weight(&across, "rudder")?,
-        },
+        longitudinal: longitudinal(&o.required("longitudinal")?)?,
+        lateral: lateral(&o.required("lateral")?)?,
+    })
+}
+
+pub(super) fn longitudinal(place: &Place<'_>) -> Result<LongitudinalWeights, KeyError> {
+    let o = place.object(&["states", "elevator"])?;
+    Ok(LongitudinalWeights { states: state_weights(&o, "u, w, q, theta")?, elevator: input_weight(&o, "elevator")? })
+}
+
+pub(super) fn lateral(place: &Place<'_>) -> Result<LateralWeights, KeyError> {
+    let o = place.object(&["states", "aileron", "rudder"])?;
+    Ok(LateralWeights {
+        states: state_weights(&o, "v, p, r, phi")?,
+        aileron: input_weight(&o, "aileron")?,
+        rudder: input_weight(&o, "rudder")?,
     })
 }
 

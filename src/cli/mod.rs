@@ -22,6 +22,7 @@ pub mod output;
 pub mod plan;
 pub mod replay;
 pub mod schema;
+mod signals;
 pub mod simulate;
 mod stop;
 pub mod trim;
@@ -33,6 +34,7 @@ use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use self::output::{Detail, exit_status, print_help, say};
+pub use self::signals::watch_signals;
 pub use self::stop::Stop;
 use crate::consistency::Verdict;
 use crate::input::InputError;
@@ -114,7 +116,7 @@ enum Command {
 }
 
 /// Runs a command line, whose first word is the name of the program, and gives its exit status. Signals are the
-/// caller's: see [`Stop`].
+/// caller's: see [`watch_signals`].
 pub fn run(args: impl IntoIterator<Item = OsString>, stop: &Stop) -> u8 {
     let args: Vec<OsString> = args.into_iter().collect();
     let parsed = command().try_get_matches_from(&args).and_then(|found| Cli::from_arg_matches(&found));

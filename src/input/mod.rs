@@ -10,6 +10,7 @@ mod hdf5;
 pub mod inspect;
 mod mat;
 mod mcap;
+mod memory;
 mod names;
 mod npy;
 mod number;
@@ -36,7 +37,7 @@ use sha2::{Digest, Sha256};
 use self::columns::Choice;
 use self::rows::{Batch, Part, Rows, WORTHWHILE};
 use self::table::{BLOCK, Table};
-use crate::numerics::progress::checkpoint;
+use crate::numerics::progress::{checkpoint, lent};
 use crate::signal::check::{AxisRange, BackwardStamp, Checker, Finding, FindingKind, Outcome, TimeBase};
 use crate::signal::{Axis, Gap, LogCheck, Recording};
 use crate::units::{Dimension, Quantity, Unit, plain};
@@ -512,16 +513,23 @@ pub fn read(path: &Path, options: &LogOptions) -> Result<(Recording, LogCheck), 
     Ok((recording, scan.check))
 }
 
-/// Hex SHA-256 of the file's bytes as stored.
+/// Hex SHA-256 of the file's bytes as stored, or of the numbers of a log in memory.
 pub fn sha256(path: &Path) -> Result<String, InputError> {
+    if let Some(samples) = lent(path) {
+        return Ok(memory::sha256(&*samples));
+    }
     let fail = |error: std::io::Error| InputError::new(format!("{}: cannot read: {error}", path.display()));
     let mut file = std::fs::File::open(path).map_err(fail)?;
     let mut hash = Sha256::new();
     let mut buffer = vec![0u8; 1 << 16];
     loop {
         match file.read(&mut buffer).map_err(fail)? {
-            0 => return Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()),
+            0 => return Ok(hex(&hash.finalize())),
             n => hash.update(&buffer[..n]),
         }
     }
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -8,9 +8,10 @@ use super::account::Account;
 use super::names::Head;
 use super::table::{Source, Topic};
 use super::{
-    InputError, LogOptions, Table, arrays, columns, dataflash, hdf5, mat, mcap, npy, parquet, ros, rosbag, sqlite,
-    text, ulog,
+    InputError, LogOptions, Table, arrays, columns, dataflash, hdf5, mat, mcap, memory, npy, parquet, ros, rosbag,
+    sqlite, text, ulog,
 };
+use crate::numerics::progress::lent;
 use crate::units::Quantity;
 
 /// A file with one table.
@@ -45,6 +46,9 @@ impl Source for Single {
 /// The file of a log: itself, or the one in a folder of the EuRoC (ASL) layout or of a ROS 2 bag.
 pub(super) fn resolve(path: &Path) -> Result<PathBuf, InputError> {
     let fail = |what: String| Err(InputError::new(format!("{}: {what}", path.display())));
+    if lent(path).is_some() {
+        return Ok(path.to_path_buf());
+    }
     match std::fs::metadata(path) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return fail("there is no such file".into()),
         Err(error) => return fail(format!("cannot read: {error}")),
@@ -74,6 +78,9 @@ pub(super) fn resolve(path: &Path) -> Result<PathBuf, InputError> {
 /// Opens a log of any format.
 pub(super) fn open(path: &Path) -> Result<Box<dyn Source>, InputError> {
     let fail = |what: String| Err(InputError::new(format!("{}: {what}", path.display())));
+    if let Some(samples) = lent(path) {
+        return Ok(Box::new(Single::new("array", Box::new(memory::MemoryTable::new(path, samples)))));
+    }
     let mut start = Vec::new();
     let opened = File::open(path).and_then(|file| {
         let length = file.metadata()?.len();

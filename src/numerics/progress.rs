@@ -6,9 +6,13 @@
 //! Work that nobody watches is never stopped.
 //!
 //! A stop is no panic of the program: it is the way out that rayon's threads carry to their caller.
+//!
+//! Who waits may also lend samples that are in memory: where the work opens a log of that name, it reads them.
 
 use std::cell::RefCell;
+use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::path::Path;
 use std::sync::Arc;
 
 use rayon::ThreadPoolBuilder;
@@ -31,6 +35,24 @@ pub trait Progress: Send + Sync {
     fn is_stopped(&self) -> bool {
         false
     }
+
+    /// The log of this name, where it is in memory and not in a file.
+    fn lent(&self, _name: &Path) -> Option<Arc<dyn Samples>> {
+        None
+    }
+}
+
+/// Columns of numbers in memory, which whoever waits has and the work reads. They do not change meanwhile.
+pub trait Samples: Send + Sync {
+    /// Names of the columns with their units, as in the first line of a text log; empty where nothing names them.
+    fn names(&self) -> Vec<String>;
+
+    fn columns(&self) -> usize;
+
+    fn rows(&self) -> u64;
+
+    /// Appends these rows of a column; fewer: there is nothing left to read from.
+    fn read(&self, column: usize, rows: Range<u64>, into: &mut Vec<f64>);
 }
 
 /// The work was asked to stop.
@@ -107,6 +129,13 @@ pub fn note(line: &str) {
 /// A line about what may make the result worth less. As with [`note`], it is in the result, too.
 pub fn warning(line: &str) {
     WATCH.with_borrow(|watch| watch.iter().for_each(|watch| watch.warning(line)));
+}
+
+/// The log of this name, where who waits has lent it.
+pub fn lent(name: &Path) -> Option<Arc<dyn Samples>> {
+    // what waits may do as it likes, so it is asked while nothing is borrowed
+    let watch = WATCH.with_borrow(Clone::clone)?;
+    watch.lent(name)
 }
 
 /// Whether this is the end of work that was asked to stop: who catches panics hands it on.

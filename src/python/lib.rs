@@ -1,0 +1,198 @@
+//! The native module of the Python package: a handful of functions over `kfdesign::ops`, which take and give JSON and
+//! arrays. Everything with a name that a user types is Python, in `kfdesign/`.
+
+mod arrays;
+mod errors;
+mod job;
+mod made;
+
+use kfdesign::allan::Deviation;
+use kfdesign::allan::deviation::variances;
+use kfdesign::cli;
+use kfdesign::export::atomic::AtomicFile;
+use kfdesign::input::{Block, LogReader};
+use kfdesign::ops::reading::{Reading, note_check};
+use kfdesign::units::{Quantity, Unit};
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::arrays::Lent;
+use crate::errors::raised;
+use crate::made::{Made, asked};
+
+/// A result with its document, and the notes that were made on the way.
+#[pyclass(frozen, module = "kfdesign._native")]
+struct Outcome {
+    made: Made,
+    #[pyo3(get)]
+    notes: Vec<String>,
+}
+
+#[pymethods]
+impl Outcome {
+    /// What the command prints with `json`.
+    fn json(&self) -> PyResult<String> {
+        self.made.json().map_err(|error| raised(&error))
+    }
+
+    /// What the command's `output` holds, where that is a document of its own.
+    fn file(&self) -> Option<String> {
+        self.made.file()
+    }
+
+    /// Texts by name: `brief` and `full` as on a terminal, `page` of HTML, `figures` as SVG, `junit`.
+    fn shown(&self, py: Python<'_>, name: &str) -> PyResult<Option<String>> {
+        // on threads of its own like any work: figures of runs are simulated
+        Ok(job::call(py, &[], None, None, || self.made.shown(name))?.0)
+    }
+
+    /// Name and text of files of another program.
+    fn files(&self) -> Vec<(Option<String>, String)> {
+        self.made.files()
+    }
+}
+
+/// What a command is asked for, as JSON, becomes its result. `logs`: those in memory, under their names.
+#[pyfunction]
+#[pyo3(signature = (name, request, logs, listener=None, threads=None))]
+fn run(
+    py: Python<'_>,
+    name: &str,
+    request: &str,
+    logs: Vec<Lent>,
+    listener: Option<Py<PyAny>>,
+    threads: Option<usize>,
+) -> PyResult<Outcome> {
+    let (made, notes) = job::call(py, &logs, listener, threads, || made::make(name, request))?;
+    Ok(Outcome { made, notes })
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Asked {
+    log: std::path::PathBuf,
+    #[serde(default)]
+    reading: Reading,
+}
+
+#[derive(Serialize)]
+struct Found<'a> {
+    quantity: Quantity,
+    axes: Vec<[&'a str; 2]>,
+    sha256: &'a str,
+    check: &'a kfdesign::signal::LogCheck,
+}
+
+/// A log: what is in it as JSON; where wished, its axes one behind the other, its stamps and what is missing before
+/// each sample.
+#[pyfunction]
+#[pyo3(signature = (request, logs, data, listener=None))]
+#[expect(clippy::type_complexity, reason = "a tuple of Python, which has no name there either")]
+fn log<'py>(
+    py: Python<'py>,
+    request: &str,
+    logs: Vec<Lent>,
+    data: bool,
+    listener: Option<Py<PyAny>>,
+) -> PyResult<(String, Vec<String>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u64>>)> {
+    let read = || {
+        let asked: Asked = asked(request)?;
+        let mut reader = asked.reading.read(None, |options| LogReader::open(&asked.log, &options))?;
+        let check = reader.check().clone();
+        if !data {
+            note_check(&asked.log.display().to_string(), &check);
+        }
+        let axes = reader.axes().to_vec();
+        let axes = axes.iter().map(|axis| [axis.name.as_str(), axis.unit.text()]).collect();
+        let found = Found { quantity: reader.quantity(), axes, sha256: reader.sha256(), check: &check };
+        let text = serde_json::to_string(&found)?;
+        let (samples, count) = (check.samples as usize, if data { reader.axes().len() } else { 0 });
+        let (mut values, mut time, mut missing) = (vec![f64::NAN; samples * count], Vec::new(), Vec::new());
+        let (mut block, mut row) = (Block::default(), 0);
+        while data && reader.next_block(&mut block)? {
+            let rows = block.time_s.len();
+            for (axis, own) in block.values.iter().enumerate() {
+                values[axis * samples + row..axis * samples + row + rows].copy_from_slice(own);
+            }
+            time.extend_from_slice(&block.time_s);
+            missing.extend_from_slice(&block.missing);
+            row += rows;
+        }
+        Ok((text, values, time, missing))
+    };
+    let ((text, values, time, missing), notes) = job::call(py, &logs, listener, None, read)?;
+    let vector = |values| PyArray1::from_vec(py, values);
+    Ok((text, notes, vector(values), vector(time), PyArray1::from_vec(py, missing)))
+}
+
+/// Deviations of a phase, and the number of differences behind each, at averaging factors.
+#[pyfunction]
+fn deviations(
+    py: Python<'_>,
+    kind: &str,
+    phase: PyReadonlyArray1<'_, f64>,
+    dt: f64,
+    factors: Vec<u64>,
+) -> PyResult<Vec<(f64, u64)>> {
+    let kind = match kind {
+        "adev" => Deviation::Adev,
+        "oadev" => Deviation::Oadev,
+        "mdev" => Deviation::Mdev,
+        "hdev" => Deviation::Hdev,
+        "ohdev" => Deviation::Ohdev,
+        "totdev" => Deviation::Totdev,
+        other => return Err(PyValueError::new_err(format!("no deviation {other}"))),
+    };
+    let phase = phase.as_slice()?;
+    let (found, _) = job::call(py, &[], None, None, || Ok(variances(kind, phase, dt, &factors)?))?;
+    Ok(found.iter().map(|one| (one.variance.sqrt(), one.terms)).collect())
+}
+
+/// The factor from a unit to SI, and the name of its dimension.
+#[pyfunction]
+fn unit(text: &str) -> PyResult<(f64, String)> {
+    let unit = Unit::parse(text).map_err(|error| PyValueError::new_err(error.to_string()))?;
+    Ok((unit.to_si(1.0), unit.dimension().name()))
+}
+
+/// Files that appear whole, and all of them or none.
+#[pyfunction]
+fn write(files: Vec<(std::path::PathBuf, String)>) -> PyResult<()> {
+    let all = || {
+        let mut open = Vec::new();
+        for (path, text) in &files {
+            let mut output = AtomicFile::create(path)?;
+            std::io::Write::write_all(&mut output, text.as_bytes())?;
+            open.push(output);
+        }
+        open.into_iter().try_for_each(AtomicFile::commit)?;
+        Ok(())
+    };
+    all().map_err(|error| raised(&error))
+}
+
+/// The command `kfdesign` with these arguments, in a process that is nothing else; its exit status.
+#[pyfunction(name = "cli")]
+fn command(py: Python<'_>, arguments: Vec<std::ffi::OsString>) -> u8 {
+    py.detach(|| {
+        let stop = std::sync::Arc::new(cli::Stop::default());
+        cli::watch_signals(&stop);
+        cli::run(arguments, &stop)
+    })
+}
+
+#[pymodule]
+fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    // a panic is caught and raised; what Rust prints about it would not reach a notebook
+    std::panic::set_hook(Box::new(|_| {}));
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<Outcome>()?;
+    module.add_function(wrap_pyfunction!(run, module)?)?;
+    module.add_function(wrap_pyfunction!(log, module)?)?;
+    module.add_function(wrap_pyfunction!(deviations, module)?)?;
+    module.add_function(wrap_pyfunction!(unit, module)?)?;
+    module.add_function(wrap_pyfunction!(write, module)?)?;
+    module.add_function(wrap_pyfunction!(command, module)?)
+}

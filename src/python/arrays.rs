@@ -1,51 +1,45 @@
-//! Logs in memory: columns of NumPy, lent to the work without a copy.
+//! Logs in memory: columns of NumPy, lent to the work.
 //!
-//! The work runs on threads that outlive no call and hold no interpreter, and an array must not leave the call that
-//! borrowed it. So the thread that waits keeps the arrays, and hands rows over when they are asked for (`job`): whole
-//! arrays are neither copied nor written to a file, and no lifetime is stretched.
+//! The work runs on threads that hold no interpreter, and what a request names is a path. So the thread that waits
+//! lends the arrays under a name, and has rows handed over as they are asked for ([`crate::job`]): no array is written
+//! to a file or copied as a whole. Bytes are what crosses the border: an array's own type would bring a second matrix
+//! library into the build, for nothing that is needed here.
 
 use std::ops::Range;
 use std::sync::mpsc::{Sender, channel};
 
 use kfdesign::numerics::progress::Samples;
-use numpy::ndarray::ArrayView1;
-use numpy::{PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 
 use crate::job::Message;
 
-/// A log under its name: heads of its columns (none: unnamed), and the columns, all of one length.
-pub(crate) struct Lent {
-    pub(crate) name: String,
-    pub(crate) heads: Vec<String>,
-    pub(crate) columns: Vec<Py<numpy::PyArray1<f64>>>,
-}
-
-impl<'a, 'py> FromPyObject<'a, 'py> for Lent {
-    type Error = PyErr;
-
-    fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Lent> {
-        let (name, heads, columns) = object.extract()?;
-        Ok(Lent { name, heads, columns })
-    }
-}
+/// A log under its name: heads of its columns (none: unnamed), how many columns and rows, and what hands over
+/// `rows(column, start, end)` as bytes of doubles.
+#[derive(FromPyObject)]
+pub(crate) struct Lent(pub(crate) String, Vec<String>, usize, u64, Py<PyAny>);
 
 impl Lent {
-    pub(crate) fn borrowed<'py>(&self, py: Python<'py>) -> PyResult<Vec<PyReadonlyArray1<'py, f64>>> {
-        self.columns.iter().map(|column| Ok(column.bind(py).try_readonly()?)).collect()
+    pub(crate) fn rows(&self, py: Python<'_>, column: usize, rows: Range<u64>) -> PyResult<Vec<f64>> {
+        let bytes = self.4.bind(py).call1((column, rows.start, rows.end))?;
+        Ok(doubles(bytes.cast::<PyBytes>()?.as_bytes()))
+    }
+
+    pub(crate) fn seen(&self, number: usize, ask: Sender<Message>) -> Seen {
+        Seen { number, heads: self.1.clone(), columns: self.2, rows: self.3, ask }
     }
 }
 
 /// What the work sees of it.
-pub(crate) struct Asked {
-    pub(crate) number: usize,
-    pub(crate) heads: Vec<String>,
-    pub(crate) columns: usize,
-    pub(crate) rows: u64,
-    pub(crate) ask: Sender<Message>,
+pub(crate) struct Seen {
+    number: usize,
+    heads: Vec<String>,
+    columns: usize,
+    rows: u64,
+    ask: Sender<Message>,
 }
 
-impl Samples for Asked {
+impl Samples for Seen {
     fn names(&self) -> Vec<String> {
         self.heads.clone()
     }
@@ -63,11 +57,15 @@ impl Samples for Asked {
     }
 }
 
-/// These rows of a column, whatever its stride.
-pub(crate) fn rows(column: &ArrayView1<'_, f64>, rows: Range<u64>) -> Vec<f64> {
-    let here = rows.start as usize..rows.end as usize;
-    match column.as_slice() {
-        Some(values) => values.get(here).unwrap_or_default().to_vec(),
-        None => column.iter().skip(here.start).take(here.len()).copied().collect(),
-    }
+/// As this machine stores them.
+pub(crate) fn doubles(bytes: &[u8]) -> Vec<f64> {
+    bytes.as_chunks().0.iter().map(|one| f64::from_ne_bytes(*one)).collect()
+}
+
+/// The other way.
+pub(crate) fn bytes<'py>(py: Python<'py>, values: &[f64]) -> PyResult<Bound<'py, PyBytes>> {
+    PyBytes::new_with(py, values.len() * 8, |into| {
+        into.as_chunks_mut().0.iter_mut().zip(values).for_each(|(one, value)| *one = value.to_ne_bytes());
+        Ok(())
+    })
 }

@@ -1,5 +1,5 @@
 //! The one gate of every long call: the work runs on threads of its own, without the interpreter; this thread waits,
-//! looks for Ctrl-C, hands out rows of arrays, and tells who listens how far the work is.
+//! looks for Ctrl-C, has rows of arrays handed over, and tells who listens how far the work is.
 //!
 //! The threads live as long as the call, so a process that forks after one has nothing to lose: what a pool that is
 //! kept for ever would have to be told apart by process is not there.
@@ -14,11 +14,10 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use kfdesign::numerics::progress::{Progress, Samples, on_threads, watched};
-use numpy::ndarray::ArrayView1;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyOSError};
 use pyo3::prelude::*;
 
-use crate::arrays::{Asked, Lent, rows};
+use crate::arrays::{Lent, Seen};
 use crate::errors::{defect, raised};
 
 /// Between two looks for Ctrl-C: a person does not feel it, and it costs nothing.
@@ -39,7 +38,7 @@ struct Watch {
     /// Of the stage.
     done: AtomicU64,
     notes: Mutex<Vec<String>>,
-    logs: Vec<(PathBuf, Arc<Asked>)>,
+    logs: Vec<(PathBuf, Arc<Seen>)>,
 }
 
 impl Progress for Watch {
@@ -73,24 +72,17 @@ pub(crate) fn call<T: Send>(
     threads: Option<usize>,
     work: impl FnOnce() -> anyhow::Result<T> + Send,
 ) -> PyResult<(T, Vec<String>)> {
-    let held = logs.iter().map(|log| log.borrowed(py)).collect::<PyResult<Vec<_>>>()?;
-    let views: Vec<Vec<ArrayView1<'_, f64>>> =
-        held.iter().map(|columns| columns.iter().map(|column| column.as_array()).collect()).collect();
     let (tell, inbox) = channel();
-    let asked = |(number, (log, columns)): (usize, (&Lent, &Vec<ArrayView1<'_, f64>>))| {
-        let rows = columns.iter().map(ArrayView1::len).min().unwrap_or(0) as u64;
-        let (heads, ask) = (log.heads.clone(), tell.clone());
-        (PathBuf::from(&log.name), Arc::new(Asked { number, heads, columns: columns.len(), rows, ask }))
-    };
+    let seen = |(number, log): (usize, &Lent)| (PathBuf::from(&log.0), Arc::new(log.seen(number, tell.clone())));
     let watch = Arc::new(Watch {
-        logs: logs.iter().zip(&views).enumerate().map(asked).collect(),
-        tell,
+        logs: logs.iter().enumerate().map(seen).collect(),
+        tell: tell.clone(),
         stopped: AtomicBool::new(false),
         done: AtomicU64::new(0),
         notes: Mutex::new(Vec::new()),
     });
     let known: Arc<dyn Progress> = Arc::clone(&watch) as _;
-    let (own, views) = (&watch, &views);
+    let own = &watch;
     let done = py.detach(move || {
         thread::scope(|scope| {
             let worker = move || {
@@ -101,7 +93,7 @@ pub(crate) fn call<T: Send>(
             };
             let worker = thread::Builder::new().name("kfdesign".into()).spawn_scoped(scope, worker);
             let worker = worker.map_err(|error| PyOSError::new_err(format!("no thread can be made: {error}")))?;
-            let stopped_by = wait(own, &inbox, views, listener.as_ref());
+            let stopped_by = wait(own, &inbox, logs, listener.as_ref());
             let done = worker.join().unwrap_or_else(Err).map_err(|why| defect(&*why))?;
             match (stopped_by, done) {
                 (Some(error), _) => Err(error),
@@ -115,12 +107,7 @@ pub(crate) fn call<T: Send>(
 }
 
 /// Until the work is done; what made it stop, if anything did.
-fn wait(
-    watch: &Watch,
-    inbox: &Receiver<Message>,
-    views: &[Vec<ArrayView1<'_, f64>>],
-    listener: Option<&Py<PyAny>>,
-) -> Option<PyErr> {
+fn wait(watch: &Watch, inbox: &Receiver<Message>, logs: &[Lent], listener: Option<&Py<PyAny>>) -> Option<PyErr> {
     let mut stopped_by: Option<PyErr> = None;
     let mut stage = ("", 0);
     let mut looked = Instant::now();
@@ -132,9 +119,12 @@ fn wait(
                 let end = || tell(listener, stage, watch.done.load(Ordering::Relaxed));
                 return stopped_by.or_else(|| end().err());
             }
-            Ok(Message::Rows { log, column, rows: wanted, back }) => {
-                let found = views.get(log).and_then(|columns| columns.get(column));
-                let _ = back.send(found.map(|column| rows(column, wanted)).unwrap_or_default());
+            Ok(Message::Rows { log, column, rows, back }) => {
+                match Python::attach(|py| logs[log].rows(py, column, rows)) {
+                    Ok(values) => drop(back.send(values)),
+                    // an answer without rows ends the reading
+                    Err(error) => heard = Err(error),
+                }
             }
             Ok(Message::Begin(name, parts)) => {
                 stage = (name, parts);

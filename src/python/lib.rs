@@ -13,12 +13,12 @@ use kfdesign::export::atomic::AtomicFile;
 use kfdesign::input::{Block, LogReader};
 use kfdesign::ops::reading::{Reading, note_check};
 use kfdesign::units::{Quantity, Unit};
-use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 use serde::{Deserialize, Serialize};
 
-use crate::arrays::Lent;
+use crate::arrays::{Lent, bytes, doubles};
 use crate::errors::raised;
 use crate::made::{Made, asked};
 
@@ -32,25 +32,21 @@ struct Outcome {
 
 #[pymethods]
 impl Outcome {
-    /// What the command prints with `json`.
-    fn json(&self) -> PyResult<String> {
-        self.made.json().map_err(|error| raised(&error))
+    #[getter]
+    fn json(&self) -> &str {
+        &self.made.json
     }
-
-    /// What the command's `output` holds, where that is a document of its own.
-    fn file(&self) -> Option<String> {
-        self.made.file()
+    #[getter]
+    fn file(&self) -> Option<&str> {
+        self.made.file.as_deref()
     }
-
-    /// Texts by name: `brief` and `full` as on a terminal, `page` of HTML, `figures` as SVG, `junit`.
+    #[getter]
+    fn files(&self) -> Vec<(Option<String>, String)> {
+        self.made.files.clone()
+    }
     fn shown(&self, py: Python<'_>, name: &str) -> PyResult<Option<String>> {
         // on threads of its own like any work: figures of runs are simulated
-        Ok(job::call(py, &[], None, None, || self.made.shown(name))?.0)
-    }
-
-    /// Name and text of files of another program.
-    fn files(&self) -> Vec<(Option<String>, String)> {
-        self.made.files()
+        Ok(job::call(py, &[], None, None, || (self.made.shown)(name))?.0)
     }
 }
 
@@ -80,23 +76,21 @@ struct Asked {
 #[derive(Serialize)]
 struct Found<'a> {
     quantity: Quantity,
-    axes: Vec<[&'a str; 2]>,
+    axes: Vec<[String; 2]>,
     sha256: &'a str,
     check: &'a kfdesign::signal::LogCheck,
 }
 
-/// A log: what is in it as JSON; where wished, its axes one behind the other, its stamps and what is missing before
-/// each sample.
+/// A log: what is in it as JSON, notes; where wished, its axes and stamps as bytes of doubles, SI.
 #[pyfunction]
 #[pyo3(signature = (request, logs, data, listener=None))]
-#[expect(clippy::type_complexity, reason = "a tuple of Python, which has no name there either")]
 fn log<'py>(
     py: Python<'py>,
     request: &str,
     logs: Vec<Lent>,
     data: bool,
     listener: Option<Py<PyAny>>,
-) -> PyResult<(String, Vec<String>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u64>>)> {
+) -> PyResult<(String, Vec<String>, Vec<Bound<'py, PyBytes>>)> {
     let read = || {
         let asked: Asked = asked(request)?;
         let mut reader = asked.reading.read(None, |options| LogReader::open(&asked.log, &options))?;
@@ -104,38 +98,25 @@ fn log<'py>(
         if !data {
             note_check(&asked.log.display().to_string(), &check);
         }
-        let axes = reader.axes().to_vec();
-        let axes = axes.iter().map(|axis| [axis.name.as_str(), axis.unit.text()]).collect();
+        let axes = reader.axes().iter().map(|axis| [axis.name.clone(), axis.unit.text().to_string()]).collect();
         let found = Found { quantity: reader.quantity(), axes, sha256: reader.sha256(), check: &check };
         let text = serde_json::to_string(&found)?;
-        let (samples, count) = (check.samples as usize, if data { reader.axes().len() } else { 0 });
-        let (mut values, mut time, mut missing) = (vec![f64::NAN; samples * count], Vec::new(), Vec::new());
-        let (mut block, mut row) = (Block::default(), 0);
+        let mut columns = vec![Vec::with_capacity(check.samples as usize); if data { found.axes.len() + 1 } else { 0 }];
+        let mut block = Block::default();
         while data && reader.next_block(&mut block)? {
-            let rows = block.time_s.len();
-            for (axis, own) in block.values.iter().enumerate() {
-                values[axis * samples + row..axis * samples + row + rows].copy_from_slice(own);
-            }
-            time.extend_from_slice(&block.time_s);
-            missing.extend_from_slice(&block.missing);
-            row += rows;
+            let all = block.values.iter().chain([&block.time_s]);
+            columns.iter_mut().zip(all).for_each(|(column, more): (&mut Vec<f64>, _)| column.extend_from_slice(more));
         }
-        Ok((text, values, time, missing))
+        Ok((text, columns))
     };
-    let ((text, values, time, missing), notes) = job::call(py, &logs, listener, None, read)?;
-    let vector = |values| PyArray1::from_vec(py, values);
-    Ok((text, notes, vector(values), vector(time), PyArray1::from_vec(py, missing)))
+    let ((text, columns), notes) = job::call(py, &logs, listener, None, read)?;
+    // one after the other is freed
+    Ok((text, notes, columns.into_iter().map(|column| bytes(py, &column)).collect::<PyResult<_>>()?))
 }
 
 /// Deviations of a phase, and the number of differences behind each, at averaging factors.
 #[pyfunction]
-fn deviations(
-    py: Python<'_>,
-    kind: &str,
-    phase: PyReadonlyArray1<'_, f64>,
-    dt: f64,
-    factors: Vec<u64>,
-) -> PyResult<Vec<(f64, u64)>> {
+fn deviations(py: Python<'_>, kind: &str, phase: &[u8], dt: f64, factors: Vec<u64>) -> PyResult<Vec<(f64, u64)>> {
     let kind = match kind {
         "adev" => Deviation::Adev,
         "oadev" => Deviation::Oadev,
@@ -145,7 +126,7 @@ fn deviations(
         "totdev" => Deviation::Totdev,
         other => return Err(PyValueError::new_err(format!("no deviation {other}"))),
     };
-    let phase = phase.as_slice()?;
+    let phase = &doubles(phase);
     let (found, _) = job::call(py, &[], None, None, || Ok(variances(kind, phase, dt, &factors)?))?;
     Ok(found.iter().map(|one| (one.variance.sqrt(), one.terms)).collect())
 }

@@ -11,6 +11,7 @@ use kfdesign::allan::deviation::variances;
 use kfdesign::cli;
 use kfdesign::export::atomic::AtomicFile;
 use kfdesign::input::{Block, LogReader};
+use kfdesign::numerics::distribution::chi_square_quantile;
 use kfdesign::ops::reading::{Reading, note_check};
 use kfdesign::units::{Quantity, Unit};
 use pyo3::exceptions::PyValueError;
@@ -138,6 +139,12 @@ fn unit(text: &str) -> PyResult<(f64, String)> {
     Ok((unit.to_si(1.0), unit.dimension().name()))
 }
 
+/// The value below which this share of χ² with so many degrees of freedom lies.
+#[pyfunction]
+fn chi_square(share: f64, degrees: f64) -> f64 {
+    chi_square_quantile(share, degrees)
+}
+
 /// Files that appear whole, and all of them or none.
 #[pyfunction]
 fn write(files: Vec<(std::path::PathBuf, String)>) -> PyResult<()> {
@@ -174,6 +181,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(log, module)?)?;
     module.add_function(wrap_pyfunction!(deviations, module)?)?;
     module.add_function(wrap_pyfunction!(unit, module)?)?;
+    module.add_function(wrap_pyfunction!(chi_square, module)?)?;
     module.add_function(wrap_pyfunction!(write, module)?)?;
     module.add_function(wrap_pyfunction!(command, module)?)
 }

@@ -1,0 +1,108 @@
+"""Kalman-filter design for inertial sensors: identify, tune, replay, prove.
+
+A log at rest goes in; noise parameters with intervals, a tuned filter, and a proof that its covariance tells the truth
+come out. Units are strings and are never guessed; every number is that of the command ``kfdesign``.
+"""
+
+from __future__ import annotations
+
+from . import allantools
+from ._call import set_threads
+from ._native import __version__
+from .commands import (
+    allan,
+    assert_consistent,
+    compare,
+    datasheet,
+    export,
+    fly,
+    identify,
+    inflate,
+    judge,
+    merge,
+    montecarlo,
+    nees,
+    plan,
+    rank,
+    read_design,
+    read_params,
+    replay,
+    simulate,
+    trim,
+    tune,
+)
+from .errors import DesignError, KfdesignError, LogError, LogWarning, ParamsError
+from .log import Check, Finding, Log, read_log
+from .results import (
+    Allan,
+    AxisFilter,
+    Comparison,
+    Design,
+    Flight,
+    Identified,
+    Inflation,
+    LogPlan,
+    Measured,
+    MonteCarlo,
+    Nees,
+    Params,
+    Ranking,
+    Replay,
+    Result,
+    Simulation,
+    Table,
+    Trim,
+)
+
+__all__ = [
+    "Allan",
+    "AxisFilter",
+    "Check",
+    "Comparison",
+    "Design",
+    "DesignError",
+    "Finding",
+    "Flight",
+    "Identified",
+    "Inflation",
+    "KfdesignError",
+    "Log",
+    "LogError",
+    "LogPlan",
+    "LogWarning",
+    "Measured",
+    "MonteCarlo",
+    "Nees",
+    "Params",
+    "ParamsError",
+    "Ranking",
+    "Replay",
+    "Result",
+    "Simulation",
+    "Table",
+    "Trim",
+    "__version__",
+    "allan",
+    "allantools",
+    "assert_consistent",
+    "compare",
+    "datasheet",
+    "export",
+    "fly",
+    "identify",
+    "inflate",
+    "judge",
+    "merge",
+    "montecarlo",
+    "nees",
+    "plan",
+    "rank",
+    "read_design",
+    "read_log",
+    "read_params",
+    "replay",
+    "set_threads",
+    "simulate",
+    "trim",
+    "tune",
+]

@@ -1,0 +1,168 @@
+"""Figures with matplotlib, of which the package otherwise knows nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ._call import number_of
+from .errors import KfdesignError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from .results import Budget, Curve
+
+Floats = npt.NDArray[np.float64]
+
+
+def _axes(ax: Axes | None) -> Axes:
+    if ax is not None:
+        return ax
+    try:
+        import matplotlib.pyplot as plt
+    except ImportError:
+        raise KfdesignError("plots need matplotlib: pip install 'kfdesign[plot]'") from None
+    made: Axes = plt.subplots(figsize=(7.0, 4.3), layout="constrained")[1]
+    made.spines[["top", "right"]].set_visible(False)
+    return made
+
+
+def _legend(ax: Axes) -> Axes:
+    if ax.get_legend_handles_labels()[1]:
+        ax.legend(frameon=False)
+    return ax
+
+
+def curves(found: Sequence[Curve], ax: Axes | None) -> Axes:
+    """Deviations with their intervals, and the model's as a line."""
+    ax = _axes(ax)
+    for curve in found:
+        (line,) = ax.loglog(curve.tau, curve.deviation, "." if curve.model is not None else ".-", label=curve.name)
+        ax.fill_between(curve.tau, curve.lower, curve.upper, color=line.get_color(), alpha=0.2, linewidth=0)
+        if curve.model is not None:
+            ax.loglog(curve.tau, curve.model, color=line.get_color(), linewidth=1.0)
+    ax.set_xlabel("averaging time, s")
+    ax.set_ylabel(f"deviation, {found[0].unit}")
+    return _legend(ax)
+
+
+def comparison(axes: Sequence[Mapping[str, Any]], ax: Axes | None) -> Axes:
+    """The measured curve over the model's, within the envelope."""
+    ax = _axes(ax)
+    for axis in axes:
+        allan = {key: np.array(axis["allan"][key], float) for key in ("tau_s", "measured", "model", "lower", "upper")}
+        ratio = lambda key: allan[key] / allan["model"]  # noqa: E731
+        (line,) = ax.semilogx(allan["tau_s"], ratio("measured"), ".-", label=axis["name"])
+        ax.fill_between(allan["tau_s"], ratio("lower"), ratio("upper"), color=line.get_color(), alpha=0.12, linewidth=0)
+    ax.axhline(1.0, color="0.4", linewidth=0.8)
+    ax.set_xlabel("averaging time, s")
+    ax.set_ylabel("Allan deviation of the log over the model's")
+    return _legend(ax)
+
+
+def sigma(reports: Sequence[Mapping[str, Any]], until: str | float | None, ax: Axes | None, label: str | None) -> Axes:
+    """Predicted sigma of the drift; axes that are alike are one line."""
+    ax = _axes(ax)
+    end = number_of(until, "s", "until")
+    lines: dict[str, tuple[list[str], Floats, Floats]] = {}
+    for report in reports:
+        time, total = (np.array(report["predicted"][key], float) for key in ("time_s", "total"))
+        lines.setdefault(repr(report["predicted"]["total"]), ([], time, total))[0].append(report["name"])
+    for names, time, total in lines.values():
+        inside = time > 0.0 if end is None else (time > 0.0) & (time <= end)
+        name = ", ".join(names)
+        # one line with a label of its own needs no names of axes
+        shown = label if label is not None and len(lines) == 1 else f"{label}, {name}" if label is not None else name
+        ax.loglog(time[inside], total[inside], label=shown)
+    ax.set_xlabel("time, s")
+    ax.set_ylabel("predicted 1 sigma of the drift, SI")
+    return _legend(ax)
+
+
+def budget(table: Budget, ax: Axes | None) -> Axes:
+    """Shares of the error of one output, one bar for each axis."""
+    ax = _axes(ax)
+    names = list(dict.fromkeys(table["axis"]))
+    sources = list(dict.fromkeys(table["source"]))
+    left = np.zeros(len(names))
+    for source in sources:
+        shares = np.zeros(len(names))
+        for row in table.rows():
+            if row["source"] == source:
+                shares[names.index(row["axis"])] += 100.0 * row["share"]
+        ax.barh(names, shares, left=left, label=source)
+        left += shares
+    ax.invert_yaxis()
+    ax.set_xlabel("share of the steady variance, %")
+    ax.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=min(len(sources), 4))
+    return ax
+
+
+#: Points of a line: more are not seen, and a line of millions takes seconds.
+_POINTS = 4000
+
+
+def lines(columns: Mapping[str, Floats], names: Sequence[str], ax: Axes | None) -> Axes:
+    """Columns over time."""
+    ax = _axes(ax)
+    step = max(len(columns["time (s)"]) // _POINTS, 1)
+    for name, values in columns.items():
+        if name.split(" (")[0] in names:
+            ax.plot(columns["time (s)"][::step], values[::step], label=name)
+    ax.set_xlabel("time, s")
+    return _legend(ax)
+
+
+def estimates(columns: Mapping[str, Floats], ax: Axes | None) -> Axes:
+    """The last state of every axis, which is its drift or bias, with two sigmas."""
+    ax = _axes(ax)
+    if "time (s)" not in columns:
+        raise KfdesignError("the replay has no estimates: ask for them with estimates=True")
+    time = columns["time (s)"]
+    step = max(len(time) // _POINTS, 1)
+    pairs = [
+        (name, name.replace(" (", "_sigma ("))
+        for name in columns
+        if name.replace(" (", "_sigma (") in columns and not name.split(" (")[0].endswith(("_sigma", "_smoothed"))
+    ]
+    units = {name.rsplit(" (", 1)[-1].rstrip(")") for name, _ in pairs}
+    first = pairs[0][0].rsplit(" (", 1)[-1] if pairs else ""
+    for name, own_sigma in pairs:
+        # one unit on one scale
+        if name.rsplit(" (", 1)[-1] != first:
+            continue
+        (line,) = ax.plot(time[::step], columns[name][::step], label=name.split(" (")[0], linewidth=1.0)
+        low, high = (columns[name] + side * columns[own_sigma] for side in (-2.0, 2.0))
+        ax.fill_between(time[::step], low[::step], high[::step], color=line.get_color(), alpha=0.2, linewidth=0)
+    ax.set_xlabel("time, s")
+    ax.set_ylabel(f"estimate ± 2 sigma, {first.rstrip(')')}" if units else "estimate")
+    return _legend(ax)
+
+
+def nees(axes: Sequence[Mapping[str, Any]], ax: Axes | None) -> Axes:
+    """Mean NEES over runs, and the band in which it is expected."""
+    ax = _axes(ax)
+    for axis in axes:
+        found = axis["nees"]
+        time = np.array(found["time_s"], float)
+        (line,) = ax.plot(time, found["mean"], label=axis["name"], linewidth=1.0)
+        ax.fill_between(time, found["lower"], found["upper"], color=line.get_color(), alpha=0.1, linewidth=0)
+    ax.axhline(float(axes[0]["nees"]["expected"][-1]), color="0.4", linewidth=0.8)
+    ax.set_xlabel("time, s")
+    ax.set_ylabel("NEES per component, mean of all runs")
+    return _legend(ax)
+
+
+def poles(found: Sequence[complex], ax: Axes | None) -> Axes:
+    """Eigenvalues in the plane."""
+    ax = _axes(ax)
+    ax.plot([one.real for one in found], [one.imag for one in found], "x")
+    ax.plot([one.real for one in found if one.imag], [-one.imag for one in found if one.imag], "x", color="C0")
+    ax.axvline(0.0, color="0.4", linewidth=0.8)
+    ax.set_xlabel("real part, 1/s")
+    ax.set_ylabel("imaginary part, rad/s")
+    return ax

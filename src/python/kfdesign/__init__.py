@@ -31,32 +31,31 @@ from .commands import (
     trim,
     tune,
 )
+from .design import AxisFilter, Design
 from .errors import DesignError, KfdesignError, LogError, LogWarning, ParamsError
 from .log import Check, Finding, Log, read_log
+from .params import AxisParams, Params
 from .results import (
     Allan,
-    AxisFilter,
     Comparison,
-    Design,
     Flight,
     Identified,
     Inflation,
     LogPlan,
-    Measured,
     MonteCarlo,
     Nees,
-    Params,
     Ranking,
     Replay,
     Result,
     Simulation,
-    Table,
     Trim,
 )
+from .table import Measured, Table
 
 __all__ = [
     "Allan",
     "AxisFilter",
+    "AxisParams",
     "Check",
     "Comparison",
     "Design",

@@ -14,7 +14,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, TypeVar, Union
+from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, TypeVar
 
 from . import _native
 from .errors import KfdesignError
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 P = ParamSpec("P")
 R = TypeVar("R")
 
-StrPath = Union[str, "os.PathLike[str]"]
+StrPath = str | os.PathLike[str]
 #: False: silent. True: a bar. A function hears ``(stage, done, parts)``; what it raises ends the work.
-Progress = Union[bool, Callable[[str, int, int], object]]
+Progress = bool | Callable[[str, int, int], object]
 
 _threads: int | None = None
 
@@ -297,6 +297,9 @@ def texts(values: Sequence[object] | Mapping[str, object] | str | None) -> list[
     if isinstance(values, str):
         return [values]
     if isinstance(values, Mapping):
-        joined = lambda value: value if isinstance(value, str) else ",".join(map(str, value))  # type: ignore[call-overload]  # noqa: E731
-        return [f"{name}={joined(value)}" for name, value in values.items()]
+        return [f"{name}={_joined(value)}" for name, value in values.items()]
     return [str(value) for value in values]
+
+
+def _joined(value: object) -> str:
+    return ",".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)

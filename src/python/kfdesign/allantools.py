@@ -7,7 +7,6 @@ gives intervals that know the noise.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Union
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +16,7 @@ from . import _native
 __all__ = ["adev", "hdev", "mdev", "oadev", "ohdev", "totdev"]
 
 Floats = npt.NDArray[np.float64]
-Taus = Union[str, Sequence[float], Floats, None]
+Taus = str | Sequence[float] | Floats | None
 Four = tuple[Floats, Floats, Floats, Floats]
 
 

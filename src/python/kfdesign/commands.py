@@ -4,26 +4,26 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any, Union
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _native
 from ._call import Call, Kept, Progress, StrPath, existing, number_of, suggesting, text_of, texts, writable
+from .design import Design
 from .errors import KfdesignError, LogError
 from .log import Log, read_log
+from .params import Params
 from .results import (
     Allan,
     Comparison,
-    Design,
     Flight,
     Identified,
     Inflation,
     LogPlan,
     MonteCarlo,
     Nees,
-    Params,
     Ranking,
     Replay,
     Result,
@@ -33,12 +33,12 @@ from .results import (
 )
 
 #: A log, or the path of one that says all that is needed.
-LogLike = Union[Log, StrPath]
+LogLike = Log | StrPath
 #: Noise parameters: found, read, or the path of params.json.
-ParamsLike = Union[Identified, Inflation, Params, StrPath]
+ParamsLike = Identified | Inflation | Params | StrPath
 #: A filter, or the path of filter.json.
-DesignLike = Union[Design, StrPath]
-Texts = Union[Sequence[str], Mapping[str, object], str, None]
+DesignLike = Design | StrPath
+Texts = Sequence[str] | Mapping[str, object] | str | None
 
 
 def _log(log: LogLike) -> Log:
@@ -473,7 +473,7 @@ def rank(
     designs: DesignLike | ParamsLike | Sequence[DesignLike | ParamsLike],
     logs: LogLike | Sequence[LogLike],
     *,
-    held_out: float = 0.3,
+    held_out: float = 1.0 / 3.0,
     flicker_horizon: float = 1e4,
     aids: Texts = None,
     progress: Progress = False,
@@ -1045,8 +1045,7 @@ def judge(
     ('consistent', 'inconsistent')
     """
     nu, variance = np.asarray(innovations, float), np.asarray(S, float)
-    squeezed = lambda a: a.reshape(len(a)) if a.ndim > 1 and a.size == len(a) else a  # noqa: E731
-    nu, variance = squeezed(nu), squeezed(variance)
+    nu, variance = (a.reshape(len(a)) if a.ndim > 1 and a.size == len(a) else a for a in (nu, variance))
     if nu.ndim != 1 or variance.shape not in ((), nu.shape):
         raise LogError(f"innovations {nu.shape} and S {variance.shape}: expected n scalars, and n variances or one")
     if not (variance > 0).all():
@@ -1087,7 +1086,9 @@ def nees(x: npt.ArrayLike, xhat: npt.ArrayLike, P: npt.ArrayLike) -> Nees:
         error, covariance = error[None], covariance[None]
     states = error.shape[-1]
     if error.ndim != 3 or covariance.shape != (*error.shape, states):
-        raise KfdesignError(f"x {error.shape} and P {covariance.shape}: expected runs by epochs by states, and by states")
+        raise KfdesignError(
+            f"x {error.shape} and P {covariance.shape}: expected runs by epochs by states, and by states"
+        )
     values = np.einsum("...i,...i->...", error, np.linalg.solve(covariance, error[..., None])[..., 0])
     runs = len(values)
     lower, upper = (_native.chi_square(share, float(runs * states)) / runs for share in (0.025, 0.975))

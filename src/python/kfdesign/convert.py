@@ -10,7 +10,8 @@ import numpy.typing as npt
 from .errors import DesignError
 
 if TYPE_CHECKING:
-    from .results import AxisFilter, Trim
+    from .design import AxisFilter
+    from .results import Trim
 
 
 def _one_rate(axis: AxisFilter, program: str) -> None:
@@ -29,7 +30,7 @@ def to_filterpy(axis: AxisFilter) -> Any:
     made.F, made.H, made.Q, made.R = axis.F.copy(), axis.H.copy(), axis.Q.copy(), axis.R.copy()
     made.x, made.P = axis.x0.reshape(-1, 1).copy(), axis.P0.copy()
     if inputs:
-        made.B = axis.G.copy()
+        made.B = axis.G.copy()  # type: ignore[attr-defined,unused-ignore]  # pyright: ignore[reportAttributeAccessIssue]
     return made
 
 

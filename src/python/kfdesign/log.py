@@ -101,9 +101,7 @@ class Log:
         self.sha256: str = found["sha256"]
         check = found["check"]
         self.rate: float = check["sample_rate_hz"]
-        said = tuple(
-            Finding(one["kind"], one["message"], one["serious"], one.get("axis")) for one in check["findings"]
-        )
+        said = tuple(Finding(one["kind"], one["message"], one["serious"], one.get("axis")) for one in check["findings"])
         self.check = Check(check["samples"], self.rate, check["span_s"], said, notes)
 
     def _lent(self) -> tuple[list[str], int, int, Any]:
@@ -417,8 +415,9 @@ def _is_one(unit: str) -> bool:
 def _numbers(x: npt.ArrayLike, name: str, notes: list[str]) -> Floats:
     """Doubles in the order of this machine, without a copy where they are that already."""
     if isinstance(x, np.ma.MaskedArray):
-        notes.append(f"{int(np.ma.count_masked(x))} masked values are missing")
-        x = x.astype(np.float64).filled(np.nan)
+        masked = np.ma.getmaskarray(x)
+        notes.append(f"{int(masked.sum())} masked values are missing")
+        x = np.where(masked, np.nan, np.asarray(x.data))
     array = np.asarray(x)
     kind = array.dtype.kind
     if kind == "c":
@@ -460,8 +459,10 @@ def _columns(frame: Any, name: str) -> list[tuple[str, Any]]:
         return [(str(own.name), own.to_numpy()) for own in frame.get_columns()]
     if hasattr(frame, "column_names") and hasattr(frame, "column"):
         own = [(str(column), frame.column(at)) for at, column in enumerate(frame.column_names)]
-        return [(column, values.to_numpy(zero_copy_only=False) if _is_array(values) else values.to_numpy())
-                for column, values in own]
+        return [
+            (column, values.to_numpy(zero_copy_only=False) if _is_array(values) else values.to_numpy())
+            for column, values in own
+        ]
     if isinstance(frame, Mapping):
         return [(str(own), values) for own, values in frame.items()]
     if hasattr(frame, "__arrow_c_stream__"):

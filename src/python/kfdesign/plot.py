@@ -14,7 +14,8 @@ from .errors import KfdesignError
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from .results import Budget, Curve
+    from .results import Curve
+    from .table import Budget
 
 Floats = npt.NDArray[np.float64]
 
@@ -55,9 +56,9 @@ def comparison(axes: Sequence[Mapping[str, Any]], ax: Axes | None) -> Axes:
     ax = _axes(ax)
     for axis in axes:
         allan = {key: np.array(axis["allan"][key], float) for key in ("tau_s", "measured", "model", "lower", "upper")}
-        ratio = lambda key: allan[key] / allan["model"]  # noqa: E731
-        (line,) = ax.semilogx(allan["tau_s"], ratio("measured"), ".-", label=axis["name"])
-        ax.fill_between(allan["tau_s"], ratio("lower"), ratio("upper"), color=line.get_color(), alpha=0.12, linewidth=0)
+        measured, lower, upper = (allan[key] / allan["model"] for key in ("measured", "lower", "upper"))
+        (line,) = ax.semilogx(allan["tau_s"], measured, ".-", label=axis["name"])
+        ax.fill_between(allan["tau_s"], lower, upper, color=line.get_color(), alpha=0.12, linewidth=0)
     ax.axhline(1.0, color="0.4", linewidth=0.8)
     ax.set_xlabel("averaging time, s")
     ax.set_ylabel("Allan deviation of the log over the model's")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
@@ -14,9 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _native
-from ._call import Call, Kept, Source, StrPath, writable
-from .errors import DesignError, KfdesignError, ParamsError
+from ._call import Kept, Source, StrPath, writable
+from .errors import KfdesignError, ParamsError
 from .log import Log
+from .params import AxisParams, Params, place_of
+from .table import Measured, Summary, Table
 
 if TYPE_CHECKING:
     import pandas
@@ -25,27 +27,19 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Allan",
-    "AxisFilter",
-    "AxisParams",
-    "Budget",
     "Comparison",
-    "Design",
     "Flight",
     "Identified",
     "IdentifiedAxis",
     "Inflation",
     "Info",
     "LogPlan",
-    "Measured",
     "MonteCarlo",
     "Nees",
-    "Params",
     "Ranking",
     "Replay",
     "Result",
     "Simulation",
-    "Table",
-    "Term",
     "Trim",
 ]
 
@@ -54,94 +48,6 @@ Self = TypeVar("Self", bound="Result")
 
 #: Texts that go with a result into a pickle.
 _TEXTS = ("brief", "full", "page", "figures", "junit")
-
-
-@dataclass(frozen=True, repr=False)
-class Measured:
-    """A value with its unit and its 95 % interval."""
-
-    value: float
-    unit: str
-    interval: tuple[float, float] | None = None
-
-    @property
-    def si(self) -> float:
-        """The value in SI units and rad."""
-        return self.value * _native.unit(self.unit)[0]
-
-    def __float__(self) -> float:
-        return self.value
-
-    def __repr__(self) -> str:
-        inside = "" if self.interval is None else f" [{self.interval[0]:.4g} … {self.interval[1]:.4g}]"
-        return f"{self.value:.4g} {self.unit}{inside}"
-
-    @staticmethod
-    def of(document: Mapping[str, Any]) -> Measured:
-        inside = document.get("interval")
-        return Measured(document["value"], document["unit"], None if inside is None else (inside[0], inside[1]))
-
-
-@dataclass(frozen=True, repr=False)
-class Table:
-    """Columns of one length."""
-
-    columns: Mapping[str, Sequence[Any]]
-
-    @staticmethod
-    def of(rows: Sequence[Mapping[str, Any]]) -> Table:
-        """Rows by their scalar values; what is a list or a mapping stays in the document."""
-        names: dict[str, None] = {}
-        for row in rows:
-            names.update(dict.fromkeys(key for key, value in row.items() if not isinstance(value, (list, dict))))
-        return Table({name: [row.get(name) for row in rows] for name in names})
-
-    def __len__(self) -> int:
-        return len(next(iter(self.columns.values()), ()))
-
-    def __getitem__(self, column: str) -> Sequence[Any]:
-        return self.columns[column]
-
-    def rows(self) -> Iterator[dict[str, Any]]:
-        """One mapping for each row."""
-        for values in zip(*self.columns.values()):
-            yield dict(zip(self.columns, values))
-
-    def _cells(self) -> list[list[str]]:
-        shown = lambda value: "" if value is None else f"{value:.5g}" if isinstance(value, float) else str(value)  # noqa: E731
-        return [list(self.columns), *([shown(value) for value in values] for values in zip(*self.columns.values()))]
-
-    def __repr__(self) -> str:
-        cells = self._cells()
-        widths = [max(map(len, column)) for column in zip(*cells)]
-        return "\n".join("  ".join(cell.ljust(w) for cell, w in zip(row, widths)).rstrip() for row in cells)
-
-    def _repr_html_(self) -> str:
-        head, *rows = ["".join(f"<td>{html.escape(cell)}</td>" for cell in row) for row in self._cells()]
-        head = head.replace("td>", "th>")
-        return f"<table><tr>{head}</tr>{''.join(f'<tr>{row}</tr>' for row in rows)}</table>"
-
-    def to_pandas(self) -> pandas.DataFrame:
-        """As a table of pandas."""
-        import pandas
-
-        return pandas.DataFrame(dict(self.columns))
-
-    def to_polars(self) -> polars.DataFrame:
-        """As a table of polars."""
-        import polars
-
-        return polars.DataFrame(dict(self.columns), strict=False)
-
-
-class Budget(Table):
-    """Where the error of one output comes from."""
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Shares as bars; returns the Axes."""
-        from . import plot
-
-        return plot.budget(self, ax)
 
 
 class Result:
@@ -251,7 +157,7 @@ class Result:
 
     @property
     def verdict(self) -> str | None:
-        """"consistent", "inconsistent" or "inconclusive"; None: nothing is judged here."""
+        """ "consistent", "inconsistent" or "inconclusive"; None: nothing is judged here."""
         return self.document.get("verdict")
 
     @property
@@ -302,191 +208,6 @@ class Result:
         return {**own, "_source": self._kept()}
 
 
-class Summary(str):
-    """A text that a notebook shows as it is."""
-
-    def __repr__(self) -> str:
-        return str(self)
-
-
-def _axis(names: Sequence[str], wanted: str) -> int:
-    """The axis of this name, or whose last word it is; -1: none."""
-    if wanted in names:
-        return names.index(wanted)
-    short = [at for at, name in enumerate(names) if name.replace(" ", "_").rsplit("_", 1)[-1] == wanted]
-    return short[0] if len(short) == 1 else -1
-
-
-class Term(Mapping[str, Measured]):
-    """A noise term: its coefficients by their names, also as attributes."""
-
-    def __init__(self, name: str, document: Mapping[str, Any]) -> None:
-        self._name = name
-        self._own = {key: Measured.of(one) for key, one in document.items() if isinstance(one, dict) and "value" in one}
-
-    def __getitem__(self, key: str) -> Measured:
-        return self._own[key]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._own)
-
-    def __len__(self) -> int:
-        return len(self._own)
-
-    def __getattr__(self, name: str) -> Measured:
-        own: dict[str, Measured] = self.__dict__.get("_own", {})
-        if name in own:
-            return own[name]
-        raise AttributeError(f"{name}: {self.__dict__.get('_name', 'a term')} has {', '.join(own)}")
-
-    def __repr__(self) -> str:
-        return f"{self._name}({', '.join(f'{key}={one!r}' for key, one in self._own.items())})"
-
-
-class AxisParams:
-    """Noise parameters of one axis."""
-
-    def __init__(self, document: Mapping[str, Any]) -> None:
-        self.document = document
-        self.name: str = document["name"]
-
-    def _terms(self, name: str) -> tuple[Term, ...]:
-        found = self.document.get(name, [])
-        return tuple(Term(name, one) for one in (found if isinstance(found, list) else [found]))
-
-    def _term(self, name: str) -> Term:
-        found = self._terms(name)
-        if found:
-            return found[0]
-        why = [one["reason"] for one in self.document.get("not_identified", []) if one["term"] == name]
-        raise ParamsError(f"{self.name} has no {name}" + (f": {why[0]}" if why else ""))
-
-    @property
-    def bias(self) -> Measured | None:
-        """Constant bias."""
-        found = self.document.get("bias")
-        return None if found is None else Measured.of(found)
-
-    @property
-    def white(self) -> Term:
-        """White noise: ``density``."""
-        return self._term("white")
-
-    @property
-    def gauss_markov(self) -> tuple[Term, ...]:
-        """Gauss-Markov processes: ``std_dev``, ``correlation_time``."""
-        return self._terms("gauss_markov")
-
-    @property
-    def rate_random_walk(self) -> Term:
-        """Random walk of the rate: ``density``."""
-        return self._term("rate_random_walk")
-
-    @property
-    def flicker(self) -> Term:
-        """Flicker: ``coefficient``."""
-        return self._term("flicker")
-
-    @property
-    def terms(self) -> dict[str, tuple[Term, ...]]:
-        """All terms by their kind."""
-        names = [key for key, one in self.document.items() if key not in ("name", "bias", "not_identified")]
-        return {name: self._terms(name) for name in names if isinstance(self.document[name], (dict, list))}
-
-    @property
-    def not_identified(self) -> Table:
-        """What the log does not tell: term, reason, and how long a log would."""
-        return _not_identified([self.document])
-
-    def __repr__(self) -> str:
-        return f"AxisParams({self.name}: {', '.join(repr(one) for some in self.terms.values() for one in some)})"
-
-
-def _not_identified(axes: Sequence[Mapping[str, Any]]) -> Table:
-    rows: list[dict[str, Any]] = []
-    for axis in axes:
-        for one in axis.get("not_identified", []):
-            needed = one.get("needed_log")
-            log = None if needed is None else repr(Measured.of(needed))
-            rows.append({"axis": axis["name"], "term": one["term"], "needed_log": log, "reason": one["reason"]})
-    return Table.of(rows)
-
-
-class Params:
-    """Noise parameters of a sensor: params.json.
-
-    Attributes
-    ----------
-    origin : str or None
-        The file they are from.
-    """
-
-    def __init__(self, text: str, origin: str | None = None) -> None:
-        self._text = text
-        self.origin = origin
-        self.document: dict[str, Any] = json.loads(text)
-
-    def _document_text(self) -> str:
-        return self._text
-
-    @property
-    def quantity(self) -> str:
-        """"angular-rate" or "specific-force"."""
-        return str(self.document["quantity"])
-
-    @property
-    def sample_rate(self) -> Measured:
-        """Of the log behind them."""
-        return Measured.of(self.document["sample_rate"])
-
-    @property
-    def axes(self) -> tuple[AxisParams, ...]:
-        """Every axis."""
-        return tuple(AxisParams(one) for one in self.document["axes"])
-
-    @property
-    def not_identified(self) -> Table:
-        """What the log does not tell."""
-        return _not_identified(self.document["axes"])
-
-    def axis(self, name: str) -> AxisParams:
-        """One axis, by its name or its last word."""
-        axes = self.axes
-        at = _axis([axis.name for axis in axes], name)
-        if at < 0:
-            raise ParamsError(f"there is no axis '{name}'; there are {', '.join(axis.name for axis in axes)}")
-        return axes[at]
-
-    def __getattr__(self, name: str) -> AxisParams:
-        if name.startswith("_") or "document" not in self.__dict__:
-            raise AttributeError(name)
-        try:
-            return self.axis(name)
-        except ParamsError as error:
-            raise AttributeError(str(error)) from None
-
-    def to_json(self) -> str:
-        """params.json, byte for byte as the command writes it."""
-        return self._text
-
-    def save(self, path: StrPath) -> None:
-        """Write params.json; it appears whole or not at all."""
-        _native.write([(writable(path), self._text)])
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Params) and self._text == other._text
-
-    def __hash__(self) -> int:
-        return hash(self._text)
-
-    def __getstate__(self) -> dict[str, Any]:
-        return dict(self.__dict__)
-
-    def __repr__(self) -> str:
-        axes = ", ".join(axis.name for axis in self.axes)
-        return f"<Params of {self.quantity}: {axes} at {self.sample_rate!r}>"
-
-
 @dataclass(frozen=True)
 class Curve:
     """Deviations of one axis in its unit."""
@@ -520,7 +241,7 @@ class Allan(Result):
 
     def __getitem__(self, name: str) -> Curve:
         axes = self.axes
-        at = _axis([axis.name for axis in axes], name)
+        at = place_of([axis.name for axis in axes], name)
         if at < 0:
             raise KeyError(f"there is no axis '{name}'; there are {', '.join(axis.name for axis in axes)}")
         return axes[at]
@@ -748,8 +469,8 @@ class Inflation(Result):
     @property
     def factors(self) -> dict[str, Measured]:
         """The factor of every axis with its interval."""
-        pair = lambda one: (one["interval"][0], one["interval"][1])  # noqa: E731
-        return {one["name"]: Measured(one["factor"], "1", pair(one)) for one in self.document["axes"]}
+        axes = self.document["axes"]
+        return {one["name"]: Measured(one["factor"], "1", (one["interval"][0], one["interval"][1])) for one in axes}
 
     def save(self, path: StrPath) -> None:
         """Write the parameters."""
@@ -912,367 +633,6 @@ class Trim(Result):
         return f"{self.document['airplane']} at {trim['airspeed']:g} m/s, {trim['altitude']:g} m"
 
 
-@dataclass(frozen=True, eq=False)
-class AxisFilter:
-    """The filter of one axis, SI: x(k+1) = F x(k) + G u(k) + v, z(k) = H x(k) + w.
-
-    x0 and P0 belong to the first measurement: update first, then predict.
-    """
-
-    name: str
-    states: tuple[str, ...]
-    measurements: tuple[str, ...]
-    every: tuple[int, ...]
-    F: Floats
-    G: Floats
-    H: Floats
-    Q: Floats
-    R: Floats
-    x0: Floats
-    P0: Floats
-    #: Of the steady state, at a sample at which every measurement is taken: x⁺ = x⁻ + K ν.
-    gain: Floats
-    #: P(k|k-1) of the steady state.
-    predicted_covariance: Floats
-    #: S of the steady state.
-    innovation_covariance: Floats
-
-    @staticmethod
-    def of(document: Mapping[str, Any]) -> AxisFilter:
-        count = len(document["states"])
-        steady = document["steady_state"]
-        matrix = lambda rows: np.array(rows, float).reshape(len(rows), -1)  # noqa: E731
-        return AxisFilter(
-            document["name"],
-            tuple(one["name"] for one in document["states"]),
-            tuple(one["name"] for one in document["measurements"]),
-            tuple(one.get("every", 1) for one in document["measurements"]),
-            matrix(document["F"]),
-            matrix(document.get("G") or [[]] * count),
-            matrix(document["H"]),
-            matrix(document["Q"]),
-            matrix(document["R"]),
-            np.array(document["x0"], float),
-            matrix(document["P0"]),
-            matrix(steady["gain"]),
-            matrix(steady["predicted_covariance"]),
-            matrix(steady["innovation_covariance"]),
-        )
-
-
-class Design(Result):
-    """A Kalman filter, and where it was made here what is expected of it.
-
-    Of a design with one axis the matrices are attributes of the design too; of several say which: ``design["x"].F``.
-    """
-
-    _format = "kfdesign-tune|kfdesign-filter|kfdesign-tune-attitude|kfdesign-attitude"
-
-    def __init__(self, source: Source, origin: str | None = None) -> None:
-        self.origin = origin
-        super().__init__(source)
-
-    def _document_text(self) -> str:
-        text = self._source.file
-        return text if text is not None else json.dumps(self.filter, indent=2) + "\n"
-
-    @property
-    def filter(self) -> dict[str, Any]:
-        """The document filter.json."""
-        found: dict[str, Any] = self.document.get("filter", self.document)
-        return found
-
-    @property
-    def verdict(self) -> str | None:
-        found: str | None = self.document.get("verification", {}).get("verdict")
-        return found
-
-    @property
-    def meaning(self) -> str:
-        return str(self.document.get("verification", {}).get("meaning", ""))
-
-    @property
-    def tests(self) -> Table:
-        return Table.of(self.document.get("verification", {}).get("tests", []))
-
-    @property
-    def rate(self) -> float:
-        """Sample rate, Hz."""
-        return Measured.of(self.filter["sample_rate"]).value
-
-    @cached_property
-    def axes(self) -> tuple[AxisFilter, ...]:
-        """The filter of every axis."""
-        if "attitude" in self.filter["format"]:
-            raise DesignError("an attitude filter is nonlinear: it has no matrices; see to_dict()")
-        return tuple(AxisFilter.of(one) for one in self.filter["axes"])
-
-    def _at(self, axis: str | None) -> int:
-        names = [one.name for one in self.axes]
-        if axis is None:
-            if len(names) == 1:
-                return 0
-            raise DesignError(f"the design has the axes {', '.join(names)}; say which, such as design['{names[0]}']")
-        at = _axis(names, axis)
-        if at < 0:
-            raise DesignError(f"there is no axis '{axis}'; there are {', '.join(names)}")
-        return at
-
-    def __getitem__(self, axis: str) -> AxisFilter:
-        return self.axes[self._at(axis)]
-
-    @property
-    def F(self) -> Floats:
-        """Transition, states by states."""
-        return self.axes[self._at(None)].F
-
-    @property
-    def G(self) -> Floats:
-        """Input, states by inputs."""
-        return self.axes[self._at(None)].G
-
-    @property
-    def H(self) -> Floats:
-        """Measurement, measurements by states."""
-        return self.axes[self._at(None)].H
-
-    @property
-    def Q(self) -> Floats:
-        """Process noise covariance of a sample."""
-        return self.axes[self._at(None)].Q
-
-    @property
-    def R(self) -> Floats:
-        """Measurement noise covariance."""
-        return self.axes[self._at(None)].R
-
-    @property
-    def P0(self) -> Floats:
-        """Covariance before the first measurement."""
-        return self.axes[self._at(None)].P0
-
-    @property
-    def x0(self) -> Floats:
-        """Estimate before the first measurement."""
-        return self.axes[self._at(None)].x0
-
-    @property
-    def gain(self) -> Floats:
-        """K of the steady state."""
-        return self.axes[self._at(None)].gain
-
-    def _reports(self) -> list[dict[str, Any]]:
-        found: list[dict[str, Any]] = self.document.get("reports", [])
-        if not found:
-            raise DesignError("the design was not made here: nothing is predicted of it; see montecarlo()")
-        return found
-
-    def sigma(self, t: npt.ArrayLike, axis: str | None = None) -> Floats:
-        """Predicted 1 sigma of the sensor's drift, or of a state.
-
-        Parameters
-        ----------
-        t : array_like
-            Seconds from the first measurement.
-        axis : str
-            Needed where there are several.
-
-        Returns
-        -------
-        ndarray
-            SI, of the shape of `t`: straight lines in log t between the times of the document, which is exact there;
-            behind the last one its value.
-        """
-        predicted = self._reports()[self._at(axis)]["predicted"]
-        time, total = (np.array(predicted[key], float) for key in ("time_s", "total"))
-        # t = 0 has no logarithm, and half the first step stands for it
-        place = lambda t: np.log(np.maximum(t, 0.5 * time[1]))  # noqa: E731
-        return np.asarray(np.interp(place(np.asarray(t, float)), place(time), total))
-
-    @property
-    def budget(self) -> dict[str, Budget]:
-        """Where the steady error comes from: of the drift, and of every state of the plant."""
-        rows: dict[str, list[dict[str, Any]]] = {}
-        for report in self._reports():
-            parts = [("drift", report["error_budget"])]
-            parts += [(one["state"], one["error_budget"]) for one in report.get("plant_budgets", [])]
-            for output, items in parts:
-                rows.setdefault(output, []).extend({"axis": report["name"], **item} for item in items)
-        return {output: Budget(Table.of(items).columns) for output, items in rows.items()}
-
-    @property
-    def worth(self) -> Table:
-        """What other parts would buy: the steady sigma of every output, by factor; ask with ``insight=True``."""
-        found = self.document.get("insight", [])
-        if not found:
-            raise DesignError("nothing is known of other parts: tune(…, insight=True)")
-        rows = [
-            {
-                "axis": insight["axis"],
-                "output": output["name"],
-                "parameter": one["parameter"],
-                "factor": factor,
-                "sigma": sigma,
-                "change": None if sigma is None else sigma / output["sigma"] - 1.0,
-                "unit": output["unit"],
-            }
-            for insight in found
-            for output in insight["outputs"]
-            for one in output["worth"]
-            for factor, sigma in zip(one["factors"], one["sigma"])
-            if factor != 1.0
-        ]
-        return Table.of(sorted(rows, key=lambda row: -abs(row["change"] or 0.0)))
-
-    def save(self, path: StrPath) -> None:
-        """Write filter.json. A design that its own verification found inconsistent is not written."""
-        if self.verdict not in (None, "consistent"):
-            raise DesignError(f"the verification says {self.verdict}: {self.meaning}; to_json() has the whole design")
-        _native.write([(writable(path), self._document_text())])
-
-    def plot_sigma(
-        self, until: str | float | None = None, ax: Axes | None = None, label: str | None = None
-    ) -> Axes:
-        """Predicted sigma over time of every axis.
-
-        Parameters
-        ----------
-        until : str or float
-            Seconds, or with a unit; None: all that is predicted.
-        ax : matplotlib.axes.Axes
-            Where; None: a new figure.
-        label : str
-            Before the names of the axes.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-        """
-        from . import plot
-
-        return plot.sigma(self._reports(), until, ax, label)
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        return self.plot_sigma(ax=ax)
-
-    @staticmethod
-    def from_matrices(
-        F: npt.ArrayLike,
-        H: npt.ArrayLike,
-        Q: npt.ArrayLike,
-        R: npt.ArrayLike,
-        *,
-        P0: npt.ArrayLike,
-        x0: npt.ArrayLike | None = None,
-        G: npt.ArrayLike | None = None,
-        rate: float,
-        name: str = "x",
-        states: Sequence[str] | None = None,
-        unit: str = "rad/s",
-    ) -> Design:
-        """A filter of one's own: it goes through :func:`replay` and :func:`montecarlo` like one of `tune`.
-
-        Parameters
-        ----------
-        F, H, Q, R : array_like
-            x(k+1) = F x(k) + G u(k) + v, z(k) = H x(k) + w; Q and R their covariances, R diagonal.
-        P0, x0 : array_like
-            Before the first measurement; without `x0` zeros.
-        G : array_like
-            Input; none without it.
-        rate : float
-            Samples per second, Hz.
-        name : str
-            Of the axis.
-        states : sequence of str
-            Names of the states.
-        unit : str
-            SI unit of the measurement, which is the sensor: "rad/s" or "m/s^2".
-
-        Returns
-        -------
-        Design
-
-        Examples
-        --------
-        >>> import kfdesign as kf
-        >>> own = kf.Design.from_matrices(1.0, 1.0, 1e-8, 1e-4, P0=1e-3, rate=100)
-        >>> kf.montecarlo(own, runs=50, duration="60s").verdict
-        'consistent'
-        """
-        square = lambda a: np.atleast_2d(np.asarray(a, float))  # noqa: E731
-        f, h, q, r, p = (square(a) for a in (F, H, Q, R, P0))
-        count, measured = f.shape[0], h.shape[0]
-        g = np.zeros((count, 0)) if G is None else square(G)
-        start = np.zeros(count) if x0 is None else np.asarray(x0, float).reshape(-1)
-        shapes = {"F": (f, (count, count)), "H": (h, (measured, count)), "Q": (q, (count, count))}
-        shapes |= {"R": (r, (measured, measured)), "P0": (p, (count, count)), "x0": (start, (count,))}
-        shapes["G"] = (g, (count, g.shape[1]))
-        for key, (found, shape) in shapes.items():
-            if found.shape != shape:
-                raise DesignError(f"{key} is {_by(found.shape)}, expected {_by(shape)}: F has {count} states")
-            if not np.isfinite(found).all():
-                raise DesignError(f"{key} holds what is no number")
-        if states is not None and len(states) != count:
-            raise DesignError(f"{len(states)} names of states, expected {count}")
-        quantity = {"rad/s": "angular-rate", "m/s^2": "specific-force"}.get(unit)
-        if quantity is None:
-            raise DesignError(f"unit '{unit}': expected rad/s or m/s^2, the sensor in SI")
-        names = states or [f"x{at}" for at in range(count)]
-        sensor = "angular_rate" if quantity == "angular-rate" else "specific_force"
-        axis = {
-            "name": name,
-            "states": [{"name": one, "unit": unit} for one in names],
-            "inputs": [{"name": f"u{at}", "unit": "1"} for at in range(g.shape[1])],
-            "measurements": [{"name": sensor if at == 0 else f"z{at}", "unit": unit} for at in range(measured)],
-            **{key: found.tolist() for key, (found, _) in shapes.items()},
-        }
-        document = {
-            "format": "kfdesign-filter/1",
-            "quantity": quantity,
-            "sample_rate": {"value": float(rate), "unit": "Hz"},
-            "plant": "static",
-            "axes": [axis],
-        }
-        with Call() as call:
-            path = call.place("filter.json")
-            with open(path, "w", encoding="utf-8") as file:
-                json.dump(document, file)
-            # checked, and with its steady state
-            return Design(call.run("design", {"file": path}))
-
-    def to_filterpy(self, axis: str | None = None) -> Any:
-        """A KalmanFilter of filterpy; run it with ``kf.batch_filter(z, update_first=True)``."""
-        from . import convert
-
-        return convert.to_filterpy(self.axes[self._at(axis)])
-
-    def to_statsmodels(self, endog: npt.ArrayLike, axis: str | None = None) -> Any:
-        """An MLEModel of statsmodels over these samples, with the known start; ``.smooth([])`` runs it."""
-        from . import convert
-
-        return convert.to_statsmodels(self.axes[self._at(axis)], endog)
-
-    def to_control(self, axis: str | None = None) -> Any:
-        """The steady filter as a StateSpace of python-control, with its gains in both forms.
-
-        Returns
-        -------
-        StateSpace, filter gain, predictor gain
-            x⁺ = x⁻ + K ν, and K_p = F K, which is the one that ``control.dlqe`` gives.
-        """
-        from . import convert
-
-        return convert.to_control(self.axes[self._at(axis)], 1.0 / self.rate)
-
-    def _about(self) -> str:
-        return f"{self.filter.get('plant', 'attitude')}, {len(self.filter.get('axes', [])) or 3} axes"
-
-
-def _by(shape: tuple[int, ...]) -> str:
-    return " by ".join(map(str, shape))
-
-
 class Replay(_Recorded):
     """A log through a filter, with a verdict."""
 
@@ -1355,5 +715,3 @@ def columns_of(path: str) -> dict[str, Floats]:
     """The columns of a table as the command writes them."""
     table = np.load(path)
     return {name: np.ascontiguousarray(table[name]) for name in table.dtype.names}
-
-

@@ -208,7 +208,7 @@ fn find_threads() {
 }
 
 /// The error with its causes, each once: many say theirs themselves.
-fn in_one_line(error: &anyhow::Error) -> String {
+pub fn in_one_line(error: &anyhow::Error) -> String {
     let mut said: Vec<String> = Vec::new();
     for cause in error.chain().map(ToString::to_string) {
         if !said.iter().any(|text| text.contains(&cause)) {

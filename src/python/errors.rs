@@ -2,25 +2,18 @@
 
 use std::any::Any;
 
+use kfdesign::cli::in_one_line;
 use kfdesign::filter::FilterError;
 use kfdesign::import::ImportError;
 use kfdesign::input::InputError;
 use kfdesign::params::ParamsError;
 use kfdesign::tune::TuneError;
-use kfdesign::units::plain;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
-/// One line, as the command says it: causes behind each other, each once. Options that were missing are said as the
-/// keywords that would answer.
+/// One line, as the command says it; options that were missing are said as the keywords that would answer.
 pub(crate) fn raised(error: &anyhow::Error) -> PyErr {
-    let mut said: Vec<String> = Vec::new();
-    for cause in error.chain().map(ToString::to_string) {
-        if !said.iter().any(|text| text.contains(&cause)) {
-            said.push(cause);
-        }
-    }
-    let mut line = plain(&said.join(": ")).into_owned();
+    let mut line = in_one_line(error);
     let input = error.chain().find_map(|cause| cause.downcast_ref::<InputError>());
     if let Some(missing) = input.map(|error| &error.missing).filter(|missing| !missing.is_empty()) {
         let answers: Vec<String> = missing.iter().map(|(option, value)| format!("{option}={value:?}")).collect();
@@ -47,7 +40,7 @@ pub(crate) fn raised(error: &anyhow::Error) -> PyErr {
 
 /// A panic: a defect of the program, which is said as one.
 pub(crate) fn defect(why: &(dyn Any + Send)) -> PyErr {
-    let text = why.downcast_ref::<&str>().map(ToString::to_string).or_else(|| why.downcast_ref::<String>().cloned());
-    let text = text.unwrap_or_else(|| "no reason was given".into());
+    let said = why.downcast_ref::<&str>().copied().or_else(|| why.downcast_ref::<String>().map(String::as_str));
+    let text = said.unwrap_or("no reason was given");
     PyRuntimeError::new_err(format!("a defect of kfdesign, please report it: {text}"))
 }

@@ -6,6 +6,8 @@ mod errors;
 mod job;
 mod made;
 
+use std::path::PathBuf;
+
 use kfdesign::allan::Deviation;
 use kfdesign::allan::deviation::variances;
 use kfdesign::cli;
@@ -13,43 +15,16 @@ use kfdesign::export::atomic::AtomicFile;
 use kfdesign::input::{Block, LogReader};
 use kfdesign::numerics::distribution::chi_square_quantile;
 use kfdesign::ops::reading::{Reading, note_check};
-use kfdesign::units::{Quantity, Unit};
+use kfdesign::units::Unit;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use crate::arrays::{Lent, bytes, doubles};
 use crate::errors::raised;
+use crate::job::call;
 use crate::made::{Made, asked};
-
-/// A result with its document, and the notes that were made on the way.
-#[pyclass(frozen, module = "kfdesign._native")]
-struct Outcome {
-    made: Made,
-    #[pyo3(get)]
-    notes: Vec<String>,
-}
-
-#[pymethods]
-impl Outcome {
-    #[getter]
-    fn json(&self) -> &str {
-        &self.made.json
-    }
-    #[getter]
-    fn file(&self) -> Option<&str> {
-        self.made.file.as_deref()
-    }
-    #[getter]
-    fn files(&self) -> Vec<(Option<String>, String)> {
-        self.made.files.clone()
-    }
-    fn shown(&self, py: Python<'_>, name: &str) -> PyResult<Option<String>> {
-        // on threads of its own like any work: figures of runs are simulated
-        Ok(job::call(py, &[], None, None, || (self.made.shown)(name))?.0)
-    }
-}
 
 /// What a command is asked for, as JSON, becomes its result. `logs`: those in memory, under their names.
 #[pyfunction]
@@ -61,25 +36,9 @@ fn run(
     logs: Vec<Lent>,
     listener: Option<Py<PyAny>>,
     threads: Option<usize>,
-) -> PyResult<Outcome> {
-    let (made, notes) = job::call(py, &logs, listener, threads, || made::make(name, request))?;
-    Ok(Outcome { made, notes })
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Asked {
-    log: std::path::PathBuf,
-    #[serde(default)]
-    reading: Reading,
-}
-
-#[derive(Serialize)]
-struct Found<'a> {
-    quantity: Quantity,
-    axes: Vec<[String; 2]>,
-    sha256: &'a str,
-    check: &'a kfdesign::signal::LogCheck,
+) -> PyResult<Made> {
+    let (made, notes) = call(py, &logs, listener, threads, || made::make(name, request))?;
+    Ok(made.noted(notes))
 }
 
 /// A log: what is in it as JSON, notes; where wished, its axes and stamps as bytes of doubles, SI.
@@ -93,24 +52,25 @@ fn log<'py>(
     listener: Option<Py<PyAny>>,
 ) -> PyResult<(String, Vec<String>, Vec<Bound<'py, PyBytes>>)> {
     let read = || {
-        let asked: Asked = asked(request)?;
-        let mut reader = asked.reading.read(None, |options| LogReader::open(&asked.log, &options))?;
+        let (log, reading): (PathBuf, Reading) = asked(request)?;
+        let mut reader = reading.read(None, |options| LogReader::open(&log, &options))?;
         let check = reader.check().clone();
         if !data {
-            note_check(&asked.log.display().to_string(), &check);
+            note_check(&log.display().to_string(), &check);
         }
-        let axes = reader.axes().iter().map(|axis| [axis.name.clone(), axis.unit.text().to_string()]).collect();
-        let found = Found { quantity: reader.quantity(), axes, sha256: reader.sha256(), check: &check };
-        let text = serde_json::to_string(&found)?;
-        let mut columns = vec![Vec::with_capacity(check.samples as usize); if data { found.axes.len() + 1 } else { 0 }];
+        let axes: Vec<_> = reader.axes().iter().map(|axis| (&axis.name, axis.unit.text())).collect();
+        let count = if data { axes.len() + 1 } else { 0 };
+        let (quantity, sha256) = (reader.quantity(), reader.sha256());
+        let text = json!({ "quantity": quantity, "axes": axes, "sha256": sha256, "check": check }).to_string();
+        let mut columns: Vec<Vec<f64>> = (0..count).map(|_| Vec::with_capacity(check.samples as usize)).collect();
         let mut block = Block::default();
         while data && reader.next_block(&mut block)? {
             let all = block.values.iter().chain([&block.time_s]);
-            columns.iter_mut().zip(all).for_each(|(column, more): (&mut Vec<f64>, _)| column.extend_from_slice(more));
+            columns.iter_mut().zip(all).for_each(|(column, more)| column.extend_from_slice(more));
         }
         Ok((text, columns))
     };
-    let ((text, columns), notes) = job::call(py, &logs, listener, None, read)?;
+    let ((text, columns), notes) = call(py, &logs, listener, None, read)?;
     // one after the other is freed
     Ok((text, notes, columns.into_iter().map(|column| bytes(py, &column)).collect::<PyResult<_>>()?))
 }
@@ -118,17 +78,11 @@ fn log<'py>(
 /// Deviations of a phase, and the number of differences behind each, at averaging factors.
 #[pyfunction]
 fn deviations(py: Python<'_>, kind: &str, phase: &[u8], dt: f64, factors: Vec<u64>) -> PyResult<Vec<(f64, u64)>> {
-    let kind = match kind {
-        "adev" => Deviation::Adev,
-        "oadev" => Deviation::Oadev,
-        "mdev" => Deviation::Mdev,
-        "hdev" => Deviation::Hdev,
-        "ohdev" => Deviation::Ohdev,
-        "totdev" => Deviation::Totdev,
-        other => return Err(PyValueError::new_err(format!("no deviation {other}"))),
-    };
+    use Deviation::{Adev, Hdev, Mdev, Oadev, Ohdev, Totdev};
+    let named = [Adev, Oadev, Mdev, Hdev, Ohdev, Totdev].into_iter().find(|one| json!(one) == kind);
+    let kind = named.ok_or_else(|| PyValueError::new_err(format!("no deviation {kind}")))?;
     let phase = &doubles(phase);
-    let (found, _) = job::call(py, &[], None, None, || Ok(variances(kind, phase, dt, &factors)?))?;
+    let (found, _) = call(py, &[], None, None, || Ok(variances(kind, phase, dt, &factors)?))?;
     Ok(found.iter().map(|one| (one.variance.sqrt(), one.terms)).collect())
 }
 
@@ -147,7 +101,7 @@ fn chi_square(share: f64, degrees: f64) -> f64 {
 
 /// Files that appear whole, and all of them or none.
 #[pyfunction]
-fn write(files: Vec<(std::path::PathBuf, String)>) -> PyResult<()> {
+fn write(files: Vec<(PathBuf, String)>) -> PyResult<()> {
     let all = || {
         let mut open = Vec::new();
         for (path, text) in &files {
@@ -176,7 +130,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     // a panic is caught and raised; what Rust prints about it would not reach a notebook
     std::panic::set_hook(Box::new(|_| {}));
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-    module.add_class::<Outcome>()?;
+    module.add_class::<Made>()?;
     module.add_function(wrap_pyfunction!(run, module)?)?;
     module.add_function(wrap_pyfunction!(log, module)?)?;
     module.add_function(wrap_pyfunction!(deviations, module)?)?;

@@ -1,12 +1,14 @@
 //! Requests by name, and what comes of them: its document, its files, its texts. One row per command; no command is
 //! known by more than its row.
 
+use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
 use anyhow::anyhow;
 use kfdesign::cli::output::with_flags;
 use kfdesign::export::junit;
 use kfdesign::filter::FilterDesign;
+use kfdesign::import::Imported;
 use kfdesign::ops::montecarlo::{self, Judged, merge};
 use kfdesign::ops::{
     airplane, allan, compare, datasheet, export, fly, identify, import, inflate, info, plan, replay, simulate, trim,
@@ -15,8 +17,11 @@ use kfdesign::ops::{
 use kfdesign::params::Params;
 use kfdesign::report::{Report, html, terminal};
 use kfdesign::view;
+use pyo3::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+
+use crate::job::call;
 
 /// Characters in a line of a summary, as on a terminal.
 const WIDTH: usize = 80;
@@ -24,15 +29,35 @@ const WIDTH: usize = 80;
 type Shown = Box<dyn Fn(&str) -> anyhow::Result<Option<String>> + Send + Sync>;
 
 /// What was made.
+#[pyclass(frozen, name = "Outcome", module = "kfdesign._native")]
 pub(crate) struct Made {
     /// Byte for byte what the command prints with its `json`.
-    pub(crate) json: String,
+    #[pyo3(get)]
+    json: String,
     /// What the command writes with its `output`, where that is not the document above.
-    pub(crate) file: Option<String>,
+    #[pyo3(get)]
+    file: Option<String>,
     /// Files of another program; of import, the parameters of every sensor.
-    pub(crate) files: Vec<(Option<String>, String)>,
+    #[pyo3(get)]
+    files: Vec<(Option<String>, String)>,
+    #[pyo3(get)]
+    notes: Vec<String>,
+    shown: Shown,
+}
+
+impl Made {
+    pub(crate) fn noted(self, notes: Vec<String>) -> Made {
+        Made { notes, ..self }
+    }
+}
+
+#[pymethods]
+impl Made {
     /// Texts by name: `brief` and `full` as on a terminal, `page` of HTML, `figures` as SVG, `junit`.
-    pub(crate) shown: Shown,
+    fn shown(&self, py: Python<'_>, name: &str) -> PyResult<Option<String>> {
+        // on threads of its own like any work: figures of runs are simulated
+        Ok(call(py, &[], None, None, || (self.shown)(name))?.0)
+    }
 }
 
 /// A request: unknown keys and kinds are refused in one line.
@@ -48,17 +73,27 @@ fn pretty(document: &impl Serialize) -> anyhow::Result<String> {
     Ok(serde_json::to_string_pretty(document)? + "\n")
 }
 
-/// A result with its document; `view`: its report, with the title of its figures where it has such.
+/// The row of a command: its result; its document, its report and the title of its figures, if it has such, and what
+/// is written of it, of the result by that name.
+macro_rules! row {
+    ($done:expr; $d:ident => $document:expr; $view:expr; $title:expr $(; $file:expr)?) => {{
+        let done = $done;
+        let $d = &done;
+        let (json, file) = (pretty(&$document)?, None$(.or(Some($file)))?);
+        Made { file, ..made(json, done, move |$d| ($view, $title)) }
+    }};
+}
+
 fn made<D: Send + Sync + 'static>(
-    done: D,
     json: String,
+    done: D,
     view: impl for<'a> Fn(&'a D) -> (Report<'a>, Option<String>) + Send + Sync + 'static,
 ) -> Made {
     let shown = move |name: &str| {
         let (report, figures) = view(&done);
         text(name, &report, figures)
     };
-    Made { json, file: None, files: Vec::new(), shown: Box::new(shown) }
+    Made { shown: Box::new(shown), ..document(json) }
 }
 
 fn text(name: &str, report: &Report<'_>, figures: Option<String>) -> anyhow::Result<Option<String>> {
@@ -74,7 +109,7 @@ fn text(name: &str, report: &Report<'_>, figures: Option<String>) -> anyhow::Res
 
 /// A document that is read and checked, and written as it is.
 fn document(json: String) -> Made {
-    Made { json, file: None, files: Vec::new(), shown: Box::new(|_| Ok(None)) }
+    Made { json, file: None, files: Vec::new(), notes: Vec::new(), shown: Box::new(|_| Ok(None)) }
 }
 
 fn judged(judged: Judged) -> Made {
@@ -93,111 +128,53 @@ fn judged(judged: Judged) -> Made {
     Made { shown: Box::new(shown), ..document(json) }
 }
 
-fn imported(found: kfdesign::import::Imported) -> anyhow::Result<Made> {
-    let json = pretty(&found.sensors.first())?;
+fn imported(found: Imported) -> anyhow::Result<Made> {
     let files: Vec<(Option<String>, String)> = found.sensors.iter().map(|params| (None, params.to_json())).collect();
     let file = files.first().map(|(_, text)| text.clone());
-    Ok(Made { file, files, ..made(found, json, |found| (view::import::import(found), None)) })
+    Ok(Made { file, files, ..row!(found; d => d.sensors.first(); view::import::import(d); None) })
 }
 
+#[rustfmt::skip] // a table: one row, one command
 pub(crate) fn make(name: &str, request: &str) -> anyhow::Result<Made> {
-    #[derive(serde::Deserialize)]
-    struct File {
-        file: std::path::PathBuf,
-    }
     Ok(match name {
-        "params" => document(Params::read(&asked::<File>(request)?.file)?.to_json()),
-        "design" => document(FilterDesign::read(&asked::<File>(request)?.file)?.to_json()),
+        "params" => document(Params::read(&asked::<PathBuf>(request)?)?.to_json()),
+        "design" => document(FilterDesign::read(&asked::<PathBuf>(request)?)?.to_json()),
         "info" => {
-            let request: info::Request = asked(request)?;
-            let (found, name) = (info::run(&request)?, request.log.display().to_string());
-            let json = pretty(&found)?;
-            made(found, json, move |found| (view::info::info(&name, found, true), None))
+            let name = asked::<info::Request>(request)?.log.display().to_string();
+            row!(info::run(&asked(request)?)?; d => d; view::info::info(&name, d, true); None)
         }
-        "allan" => {
-            let done = allan::run(&asked(request)?)?;
-            let json = pretty(&done.document)?;
-            let title = format!("{}: {}", done.name, done.document.deviation.name());
-            made(done, json, move |done| (view::allan::allan(&done.name, &done.axes), Some(title.clone())))
-        }
-        "identify" => {
-            let done = identify::run(&asked(request)?)?;
-            let (json, file) = (pretty(&done.document())?, Some(done.params.to_json()));
-            let view = made(done, json, |done| {
-                let title = format!("{}: overlapping Allan deviation", done.name());
-                (view::identify::identify(&done.params, &done.axes, done.shared.as_ref()), Some(title))
-            });
-            Made { file, ..view }
-        }
-        "plan" => {
-            let plan = plan::run(&asked(request)?)?;
-            let json = pretty(&plan)?;
-            made(plan, json, |plan| (view::plan::plan(plan), None))
-        }
-        "compare" => {
-            let done = compare::run(&asked(request)?)?;
-            let json = pretty(&done.0)?;
-            made(done, json, |(found, unit)| (view::compare::compare(found, unit), Some("Model and log".into())))
-        }
-        "inflate" => {
-            let done = inflate::run(&asked(request)?)?;
-            let (json, file) = (pretty(&done.found)?, Some(done.params.to_json()));
-            Made { file, ..made(done, json, |done| (view::inflate::inflate(&done.found, &done.unit), None)) }
-        }
-        "simulate" => {
-            let summary = simulate::run(&asked(request)?)?;
-            let json = pretty(&summary)?;
-            made(summary, json, |summary| (view::simulate::simulate(summary), None))
-        }
-        "airplane" => {
-            let check = airplane::run(&asked(request)?)?;
-            let json = pretty(&check)?;
-            made(check, json, |check| (view::airplane::airplane(check), None))
-        }
-        "trim" => {
-            let done = trim::run(&asked(request)?)?;
-            let json = pretty(&done.document)?;
-            made(done, json, |done| (view::trim::trim(&done.linearized, &done.document), None))
-        }
-        "fly" => {
-            let done = fly::run(&asked(request)?, true)?;
-            let json = pretty(&done.report)?;
-            made(done, json, |done| {
-                let title = format!("Flight of {}", done.report.airplane);
-                (view::fly::fly(&done.report, &done.header, done.lines.as_ref(), &done.stops), Some(title))
-            })
-        }
+        "allan" => row!(allan::run(&asked(request)?)?; d => d.document; view::allan::allan(&d.name, &d.axes);
+            Some(format!("{}: {}", d.name, d.document.deviation.name()))),
+        "identify" => row!(identify::run(&asked(request)?)?; d => d.document();
+            view::identify::identify(&d.params, &d.axes, d.shared.as_ref());
+            Some(format!("{}: overlapping Allan deviation", d.name())); d.params.to_json()),
+        "plan" => row!(plan::run(&asked(request)?)?; d => d; view::plan::plan(d); None),
+        "compare" => row!(compare::run(&asked(request)?)?; d => d.0; view::compare::compare(&d.0, &d.1);
+            Some("Model and log".into())),
+        "inflate" => row!(inflate::run(&asked(request)?)?; d => d.found; view::inflate::inflate(&d.found, &d.unit); None;
+            d.params.to_json()),
+        "simulate" => row!(simulate::run(&asked(request)?)?; d => d; view::simulate::simulate(d); None),
+        "airplane" => row!(airplane::run(&asked(request)?)?; d => d; view::airplane::airplane(d); None),
+        "trim" => row!(trim::run(&asked(request)?)?; d => d.document; view::trim::trim(&d.linearized, &d.document); None),
+        "fly" => row!(fly::run(&asked(request)?, true)?; d => d.report;
+            view::fly::fly(&d.report, &d.header, d.lines.as_ref(), &d.stops);
+            Some(format!("Flight of {}", d.report.airplane))),
         "tune" => match tune::run(&asked(request)?)? {
-            tune::Done::Linear(done) => {
-                let (json, file) = (pretty(&done.document()?)?, Some(done.tuned.design.to_json()));
-                let view = made(done, json, |done| (view::tune::tune(&done.shown()), Some("Tuned filter".into())));
-                Made { file, ..view }
-            }
-            tune::Done::Attitude(tuned) => {
-                let (json, file) = (pretty(&tune::attitude::document(&tuned)?)?, Some(tuned.design.to_json()));
+            tune::Done::Linear(done) => row!(done; d => d.document()?; view::tune::tune(&d.shown());
+                Some("Tuned filter".into()); d.tuned.design.to_json()),
+            tune::Done::Attitude(done) => {
                 let name = asked::<tune::Request>(request)?.params.unwrap_or_default().display().to_string();
-                Made { file, ..made(tuned, json, move |tuned| (view::tune::attitude(&name, tuned), None)) }
+                row!(done; d => tune::attitude::document(d)?; view::tune::attitude(&name, d); None; d.design.to_json())
             }
         },
-        "rank" => {
-            let done = tune::compare::run(&asked(request)?)?;
-            let json = pretty(&done.0)?;
-            made(done, json, |(ranking, first)| (view::tune::ranking(ranking, first), None))
-        }
+        "rank" => row!(tune::compare::run(&asked(request)?)?; d => d.0; view::tune::ranking(&d.0, &d.1); None),
         "replay" => {
-            let request: replay::Request = asked(request)?;
-            let filter = request.filter.display().to_string();
-            match replay::run(&request)? {
-                replay::Done::Linear(result, unit) => {
-                    let json = pretty(&result)?;
-                    made((result, unit), json, move |(result, unit)| {
-                        (view::replay::replay(result, &filter, unit.as_ref()), Some("Replay".into()))
-                    })
-                }
-                replay::Done::Attitude(result, design) => {
-                    let json = pretty(&result)?;
-                    made((result, design), json, |(result, design)| (view::replay::attitude(result, design), None))
-                }
+            let filter = asked::<replay::Request>(request)?.filter.display().to_string();
+            match replay::run(&asked(request)?)? {
+                replay::Done::Linear(result, unit) => row!((result, unit); d => d.0;
+                    view::replay::replay(&d.0, &filter, d.1.as_ref()); Some("Replay".into())),
+                replay::Done::Attitude(result, design) => row!((result, design); d => d.0;
+                    view::replay::attitude(&d.0, &d.1); None),
             }
         }
         "montecarlo" => {
@@ -216,7 +193,7 @@ pub(crate) fn make(name: &str, request: &str) -> anyhow::Result<Made> {
             let done = export::run(&request)?;
             // the words of a file of parameters name options, as a shell knows them
             let own = |text: String| if request.to.is_code() { text } else { with_flags(&text).into_owned() };
-            let name = |path: Option<std::path::PathBuf>| path.map(|path| path.display().to_string());
+            let name = |path: Option<PathBuf>| path.map(|path| path.display().to_string());
             let files = done.files.into_iter().map(|file| (name(file.path), own(file.text))).collect();
             Made { files, ..document(pretty(&done.self_test)?) }
         }

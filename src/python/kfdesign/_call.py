@@ -196,10 +196,12 @@ class Call(AbstractContextManager["Call"]):
         return name
 
     def run(
-        self, name: str, request: Mapping[str, Any], progress: Progress = False, threads: int | None = None
+        self, name: str, request: Mapping[str, Any] | str, progress: Progress = False, threads: int | None = None
     ) -> Made:
         with Bar.of(progress) as listener:
-            given = {key: value for key, value in request.items() if value is not None}
+            given: object = request
+            if not isinstance(request, str):
+                given = {key: value for key, value in request.items() if value is not None}
             folder = None if self._folder is None else self._folder.name
             try:
                 text = json.dumps(given)
@@ -210,8 +212,9 @@ class Call(AbstractContextManager["Call"]):
                 raise type(error)(str(error).replace(folder + os.sep, "")) from None
         return Made(outcome, folder)
 
-    def read(self, request: Mapping[str, Any], data: bool) -> tuple[dict[str, Any], list[str], list[bytes]]:
-        text, notes, columns = _native.log(json.dumps(request), self._lent, data)
+    def read(self, log: str, reading: Mapping[str, Any], data: bool) -> tuple[dict[str, Any], list[str], list[bytes]]:
+        """What is in a log; where wished, its axes and its time."""
+        text, notes, columns = _native.log(json.dumps([log, reading]), self._lent, data)
         return json.loads(text), notes, columns
 
 

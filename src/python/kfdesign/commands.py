@@ -823,7 +823,7 @@ def read_params(path: StrPath, *, rate: float | None = None, sensor: str | None 
         own = file.read(64).lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{")
     with Call() as call:
         if own and rate is None:
-            call.run("params", {"file": found})
+            call.run("params", found)
             with open(found, encoding="utf-8") as text:
                 return Params(text.read(), found)
         sensors = [Params(text) for _, text in call.run("import", {"file": found, "rate": rate}).files]
@@ -851,7 +851,7 @@ def read_design(path: StrPath) -> Design:
         text = file.read()
     if "kfdesign-attitude/" not in text[:2000]:
         with Call() as call:
-            call.run("design", {"file": found})
+            call.run("design", found)
     return Design(Kept(text, text), found)
 
 

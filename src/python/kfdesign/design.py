@@ -355,7 +355,7 @@ class Design(Result):
             with open(path, "w", encoding="utf-8") as file:
                 json.dump(document, file)
             # checked, and with its steady state
-            return Design(call.run("design", {"file": path}))
+            return Design(call.run("design", path))
 
     def to_filterpy(self, axis: str | None = None) -> Any:
         """A KalmanFilter of filterpy; run it with ``kf.batch_filter(z, update_first=True)``."""

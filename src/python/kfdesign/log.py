@@ -94,7 +94,7 @@ class Log:
         self._reading = {key: value for key, value in reading.items() if value is not None}
         self._whole = whole
         with Call() as call:
-            found, _, _ = call.read({"log": call.log(self), "reading": self._reading}, data=False)
+            found, _, _ = call.read(call.log(self), self._reading, data=False)
         self.axes: tuple[str, ...] = tuple(axis for axis, _ in found["axes"])
         self.unit: str = found["axes"][0][1]
         self.quantity: str = found["quantity"]
@@ -116,7 +116,7 @@ class Log:
     @cached_property
     def _table(self) -> tuple[Floats, Floats]:
         with Call() as call:
-            _, _, columns = call.read({"log": call.log(self), "reading": self._reading}, data=True)
+            _, _, columns = call.read(call.log(self), self._reading, data=True)
         time = np.frombuffer(columns.pop())
         values = np.empty((len(columns), len(time)))
         for axis in range(len(values)):

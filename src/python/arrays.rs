@@ -1,9 +1,8 @@
 //! Logs in memory: columns of NumPy, lent to the work.
 //!
-//! The work runs on threads that hold no interpreter, and what a request names is a path. So the thread that waits
-//! lends the arrays under a name, and has rows handed over as they are asked for ([`crate::job`]): no array is written
-//! to a file or copied as a whole. Bytes are what crosses the border: an array's own type would bring a second matrix
-//! library into the build, for nothing that is needed here.
+//! What a request names is a path, and the work holds no interpreter. So the thread that waits lends the arrays under a
+//! name and has rows handed over as they are asked for ([`crate::job`]): no array is written to a file or copied as a
+//! whole. Bytes cross the border: an array's own type would bring a second matrix library into the build, for nothing.
 
 use std::ops::Range;
 use std::sync::mpsc::{Sender, channel};

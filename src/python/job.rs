@@ -1,8 +1,7 @@
 //! The one gate of every long call: the work runs on threads of its own, without the interpreter; this thread waits,
 //! looks for Ctrl-C, has rows of arrays handed over, and tells who listens how far the work is.
 //!
-//! The threads live as long as the call, so a process that forks after one has nothing to lose: what a pool that is
-//! kept for ever would have to be told apart by process is not there.
+//! The threads live as long as the call, so a process that forks after one finds no pool whose threads are gone.
 
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -116,8 +115,7 @@ fn wait(watch: &Watch, inbox: &Receiver<Message>, logs: &[Lent], listener: Optio
         let mut heard = Ok(());
         match message {
             Ok(Message::Done) | Err(RecvTimeoutError::Disconnected) => {
-                let end = || tell(listener, stage, watch.done.load(Ordering::Relaxed));
-                return stopped_by.or_else(|| end().err());
+                return stopped_by.or_else(|| tell(listener, stage, watch.done.load(Ordering::Relaxed)).err());
             }
             Ok(Message::Rows { log, column, rows, back }) => {
                 match Python::attach(|py| logs[log].rows(py, column, rows)) {

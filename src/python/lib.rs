@@ -28,7 +28,6 @@ use crate::made::{Made, asked};
 
 /// What a command is asked for, as JSON, becomes its result. `logs`: those in memory, under their names.
 #[pyfunction]
-#[pyo3(signature = (name, request, logs, listener=None, threads=None))]
 fn run(
     py: Python<'_>,
     name: &str,
@@ -38,18 +37,16 @@ fn run(
     threads: Option<usize>,
 ) -> PyResult<Made> {
     let (made, notes) = call(py, &logs, listener, threads, || made::make(name, request))?;
-    Ok(made.noted(notes))
+    Ok(Made { notes, ..made })
 }
 
 /// A log: what is in it as JSON, notes; where wished, its axes and stamps as bytes of doubles, SI.
 #[pyfunction]
-#[pyo3(signature = (request, logs, data, listener=None))]
 fn log<'py>(
     py: Python<'py>,
     request: &str,
     logs: Vec<Lent>,
     data: bool,
-    listener: Option<Py<PyAny>>,
 ) -> PyResult<(String, Vec<String>, Vec<Bound<'py, PyBytes>>)> {
     let read = || {
         let (log, reading): (PathBuf, Reading) = asked(request)?;
@@ -70,7 +67,7 @@ fn log<'py>(
         }
         Ok((text, columns))
     };
-    let ((text, columns), notes) = call(py, &logs, listener, None, read)?;
+    let ((text, columns), notes) = call(py, &logs, None, None, read)?;
     // one after the other is freed
     Ok((text, notes, columns.into_iter().map(|column| bytes(py, &column)).collect::<PyResult<_>>()?))
 }
@@ -102,17 +99,13 @@ fn chi_square(share: f64, degrees: f64) -> f64 {
 /// Files that appear whole, and all of them or none.
 #[pyfunction]
 fn write(files: Vec<(PathBuf, String)>) -> PyResult<()> {
-    let all = || {
-        let mut open = Vec::new();
-        for (path, text) in &files {
-            let mut output = AtomicFile::create(path)?;
-            std::io::Write::write_all(&mut output, text.as_bytes())?;
-            open.push(output);
-        }
-        open.into_iter().try_for_each(AtomicFile::commit)?;
-        Ok(())
+    let create = |(path, text): &(PathBuf, String)| {
+        let mut output = AtomicFile::create(path)?;
+        std::io::Write::write_all(&mut output, text.as_bytes())?;
+        anyhow::Ok(output)
     };
-    all().map_err(|error| raised(&error))
+    let open = files.iter().map(create).collect::<anyhow::Result<Vec<_>>>();
+    open.and_then(|open| Ok(open.into_iter().try_for_each(AtomicFile::commit)?)).map_err(|error| raised(&error))
 }
 
 /// The command `kfdesign` with these arguments, in a process that is nothing else; its exit status.
@@ -133,8 +126,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Made>()?;
     module.add_function(wrap_pyfunction!(run, module)?)?;
     module.add_function(wrap_pyfunction!(log, module)?)?;
-    module.add_function(wrap_pyfunction!(deviations, module)?)?;
     module.add_function(wrap_pyfunction!(unit, module)?)?;
+    module.add_function(wrap_pyfunction!(deviations, module)?)?;
     module.add_function(wrap_pyfunction!(chi_square, module)?)?;
     module.add_function(wrap_pyfunction!(write, module)?)?;
     module.add_function(wrap_pyfunction!(command, module)?)

@@ -11,8 +11,7 @@ use kfdesign::filter::FilterDesign;
 use kfdesign::import::Imported;
 use kfdesign::ops::montecarlo::{self, Judged, merge};
 use kfdesign::ops::{
-    airplane, allan, compare, datasheet, export, fly, identify, import, inflate, info, plan, replay, simulate, trim,
-    tune,
+    allan, compare, datasheet, export, fly, identify, import, inflate, info, plan, replay, simulate, trim, tune,
 };
 use kfdesign::params::Params;
 use kfdesign::report::{Report, html, terminal};
@@ -33,22 +32,16 @@ type Shown = Box<dyn Fn(&str) -> anyhow::Result<Option<String>> + Send + Sync>;
 pub(crate) struct Made {
     /// Byte for byte what the command prints with its `json`.
     #[pyo3(get)]
-    json: String,
+    pub(crate) json: String,
     /// What the command writes with its `output`, where that is not the document above.
     #[pyo3(get)]
-    file: Option<String>,
+    pub(crate) file: Option<String>,
     /// Files of another program; of import, the parameters of every sensor.
     #[pyo3(get)]
-    files: Vec<(Option<String>, String)>,
+    pub(crate) files: Vec<(Option<String>, String)>,
     #[pyo3(get)]
-    notes: Vec<String>,
-    shown: Shown,
-}
-
-impl Made {
-    pub(crate) fn noted(self, notes: Vec<String>) -> Made {
-        Made { notes, ..self }
-    }
+    pub(crate) notes: Vec<String>,
+    pub(crate) shown: Shown,
 }
 
 #[pymethods]
@@ -154,7 +147,6 @@ pub(crate) fn make(name: &str, request: &str) -> anyhow::Result<Made> {
         "inflate" => row!(inflate::run(&asked(request)?)?; d => d.found; view::inflate::inflate(&d.found, &d.unit); None;
             d.params.to_json()),
         "simulate" => row!(simulate::run(&asked(request)?)?; d => d; view::simulate::simulate(d); None),
-        "airplane" => row!(airplane::run(&asked(request)?)?; d => d; view::airplane::airplane(d); None),
         "trim" => row!(trim::run(&asked(request)?)?; d => d.document; view::trim::trim(&d.linearized, &d.document); None),
         "fly" => row!(fly::run(&asked(request)?, true)?; d => d.report;
             view::fly::fly(&d.report, &d.header, d.lines.as_ref(), &d.stops);

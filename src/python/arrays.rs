@@ -56,12 +56,11 @@ impl Samples for Seen {
     }
 }
 
-/// As this machine stores them.
+/// Doubles as this machine stores them; and back.
 pub(crate) fn doubles(bytes: &[u8]) -> Vec<f64> {
     bytes.as_chunks().0.iter().map(|one| f64::from_ne_bytes(*one)).collect()
 }
 
-/// The other way.
 pub(crate) fn bytes<'py>(py: Python<'py>, values: &[f64]) -> PyResult<Bound<'py, PyBytes>> {
     PyBytes::new_with(py, values.len() * 8, |into| {
         into.as_chunks_mut().0.iter_mut().zip(values).for_each(|(one, value)| *one = value.to_ne_bytes());

@@ -8,8 +8,7 @@ mod made;
 
 use std::path::PathBuf;
 
-use kfdesign::allan::Deviation;
-use kfdesign::allan::deviation::variances;
+use kfdesign::allan::{Deviation, deviation::variances};
 use kfdesign::cli;
 use kfdesign::export::atomic::AtomicFile;
 use kfdesign::input::{Block, LogReader};

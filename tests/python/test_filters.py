@@ -30,17 +30,21 @@ def one_axis(files: Path) -> kf.Design:
 
 @pytest.fixture(scope="module")
 def samples(one_axis: kf.Design) -> np.ndarray:
-    z = kf.simulate(
-        kf.datasheet(
-            rate=100,
-            angle_random_walk="3.4 deg/sqrt(h)",
-            bias_instability="0.03 deg/s",
-            instability="sigma",
-            correlation_time="200 s",
-            axes=["x"],
-        ),
-        duration=COUNT / 100,
-    ).log.data[:COUNT, 0].copy()
+    z = (
+        kf.simulate(
+            kf.datasheet(
+                rate=100,
+                angle_random_walk="3.4 deg/sqrt(h)",
+                bias_instability="0.03 deg/s",
+                instability="sigma",
+                correlation_time="200 s",
+                axes=["x"],
+            ),
+            duration=COUNT / 100,
+        )
+        .log.data[:COUNT, 0]
+        .copy()
+    )
     z[GAP] = np.nan
     return z
 

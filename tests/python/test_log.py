@@ -149,7 +149,9 @@ class TestFrames:
         frame = polars.DataFrame(self.columns())
         self.same(kf.Log.from_frame(frame))
         holes = frame.with_columns(
-            polars.when(polars.int_range(polars.len()) == 7).then(None).otherwise(polars.col(self.names[0]))
+            polars.when(polars.int_range(polars.len()) == 7)
+            .then(None)
+            .otherwise(polars.col(self.names[0]))
             .alias(self.names[0])
         )
         assert np.isnan(kf.Log.from_frame(holes).data[7, 0])

@@ -66,7 +66,22 @@ def public() -> Iterator[tuple[str, object]]:
 
 
 #: Of numpydoc: no sections that say nothing here (see also, extended summary, notes), examples where a call has them.
-IGNORED = {"EX01", "SA01", "ES01", "GL01", "GL02", "GL03", "GL08", "RT02", "RT03", "RT05", "PR02", "PR08", "PR09", "SS05"}
+IGNORED = {
+    "EX01",
+    "SA01",
+    "ES01",
+    "GL01",
+    "GL02",
+    "GL03",
+    "GL08",
+    "RT02",
+    "RT03",
+    "RT05",
+    "PR02",
+    "PR08",
+    "PR09",
+    "SS05",
+}
 
 
 @pytest.mark.parametrize("name", [name for name, one in public() if callable(one)])

@@ -134,8 +134,9 @@ def test_a_stop_leaves_nothing(design: kf.Design, tmp_path: Path) -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        kf.simulate(Path(__file__).parents[2] / "data/params.json", output=tmp_path / "x.npy", duration="10h",
-                    progress=raises)
+        kf.simulate(
+            Path(__file__).parents[2] / "data/params.json", output=tmp_path / "x.npy", duration="10h", progress=raises
+        )
     assert list(tmp_path.iterdir()) == []
 
 

@@ -53,11 +53,11 @@ def set_threads(count: int | None) -> None:
 
 def suggesting(function: Callable[P, R]) -> Callable[P, R]:
     """An unknown keyword is answered with the one that may be meant."""
-    known = [name for name, one in inspect.signature(function).parameters.items() if one.kind is one.KEYWORD_ONLY]
+    parameters = inspect.signature(function).parameters
+    known = [name for name, one in parameters.items() if one.kind is one.KEYWORD_ONLY]
 
     @functools.wraps(function)
     def called(*args: P.args, **kwargs: P.kwargs) -> R:
-        parameters = inspect.signature(function).parameters
         for name in kwargs:
             if name not in parameters:
                 close = get_close_matches(name, known, 1)

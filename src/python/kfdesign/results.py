@@ -503,8 +503,8 @@ class Ranking(Result):
 class _Recorded(Result):
     """A result with a table of numbers beside its document."""
 
-    def __init__(self, source: Source, columns: Mapping[str, Floats]) -> None:
-        self._columns = dict(columns)
+    def __init__(self, source: Source, columns: Mapping[str, Floats] | None = None) -> None:
+        self._columns = dict(columns or {})
         super().__init__(source)
 
     @property

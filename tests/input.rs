@@ -10,6 +10,8 @@ mod damage;
 mod every_file;
 #[path = "input/hostile.rs"]
 mod hostile;
+#[path = "input/lent.rs"]
+mod lent;
 #[path = "input/measured.rs"]
 mod measured;
 #[path = "input/memory.rs"]

@@ -1,6 +1,7 @@
 //! Figures and pages. `KFDESIGN_GALLERY=DIR cargo test report::` writes them to DIR, to be looked at.
 
 mod montecarlo;
+mod paper;
 mod records;
 mod terminal;
 
@@ -70,6 +71,7 @@ fn allan_data(axis: &str, seed: u64) -> Allan {
             curve("white noise", &|t| components(t).0),
             curve("Gauss-Markov, 194 s", &|t| components(t).1),
         ],
+        marks: vec![AllanMark { tau_s: 1.0, deviation: components(1.0).0, word: "N".into(), component: Some(0) }],
     }
 }
 
@@ -236,10 +238,29 @@ fn rms_data() -> Rms {
     };
     Rms {
         title: "gyro_x: errors and claims".into(),
-        unit: "deg/s".into(),
+        band: Some(([0.86, 1.14], "95 % at one time".into())),
         components: claims.states.iter().enumerate().map(component).collect(),
         time_s: claims.time_s,
     }
+}
+
+fn course_data() -> Course {
+    let mut noise = Normals(11);
+    let points: Vec<(f64, f64)> = (0..6000).map(|i| (0.01 * f64::from(i), -0.6 + 0.56 * noise.next())).collect();
+    let average = points.iter().map(|p| (p.0, -0.6 + 0.03 * (0.2 * p.0).sin())).collect();
+    Course {
+        title: "gyro_x: rest.csv".into(),
+        quantity: "gyro_x".into(),
+        unit: "deg/s".into(),
+        points,
+        average: Curve { label: "mean of 101 samples, 1.01 s".into(), points: average },
+        findings: vec![(12.3, "gap at 12.3 s".into()), (40.0, "outlier at 40 s, first of 3".into())],
+    }
+}
+
+fn overlay() -> String {
+    let curves = [1, 2, 3].map(|k| (format!("gyro_{k}"), allan_data("", k).points));
+    allan_overlay("rest.csv: overlapping Allan deviation", "deg/s", &curves)
 }
 
 fn gallery() -> Vec<(&'static str, String)> {
@@ -256,6 +277,8 @@ fn gallery() -> Vec<(&'static str, String)> {
         ("nees5", nees(&nees_at_five_times())),
         ("errors", errors(&error_data())),
         ("rms", rms(&rms_data())),
+        ("course", course(&course_data())),
+        ("overlay", overlay()),
     ]
 }
 
@@ -518,6 +541,13 @@ fn hostile_values_make_a_figure_all_the_same() {
                 components: vec![Component { name: "s".into(), rms: values.clone(), claimed: values.clone() }],
                 ..Rms::default()
             }),
+            course(&Course {
+                points: pairs.clone(),
+                average: curve.clone(),
+                findings: values.iter().map(|v| (*v, "something".into())).collect(),
+                ..Course::default()
+            }),
+            allan_overlay("", "", &[]),
         ];
         for (number, svg) in figures.iter().enumerate() {
             let name = format!("figure {number} of {values:?}");

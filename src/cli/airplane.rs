@@ -1,10 +1,9 @@
 //! `kfdesign airplane`.
 
-use std::path::PathBuf;
-
 use super::Status;
-use super::files::{self, Kind};
+use super::files;
 use super::output::{print_json, print_report};
+use super::plot::Plot;
 use crate::ops::airplane::{Request, run as airplane};
 use crate::view;
 
@@ -13,23 +12,23 @@ use crate::view;
 #[command(
     after_help = "Example: kfdesign airplane data/airplanes/aerosonde.json --altitude \"100 m\" --plot speeds.svg"
 )]
+#[command(mut_arg("plot", |plot| plot.help("Figures of angle of attack and elevator, drag and thrust, power over the speeds of level flight")))]
 pub struct Args {
     #[command(flatten)]
     request: Request,
-    /// Figures of angle of attack and elevator, drag and thrust, power over the speeds of level flight
-    #[arg(long, value_name = "FILE.svg")]
-    plot: Option<PathBuf>,
+    #[command(flatten)]
+    plot: Plot,
     /// One JSON document on stdout
     #[arg(long)]
     json: bool,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
-    let outputs = [("--plot", &args.plot, Kind::Svg)];
+    let outputs = [args.plot.output()];
     files::check(&outputs, &[&args.request.airplane])?;
     let check = airplane(&args.request)?;
     let mut report = view::airplane::airplane(&check);
-    files::write_plot(args.plot.as_deref(), &format!("Level flight of {}", check.name), &report)?;
+    args.plot.write(&format!("Level flight of {}", check.name), &report)?;
     if args.json {
         print_json(&check)?;
     } else {

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::files::{self, Kind};
 use super::output::{print_json, print_report};
+use super::plot::Plot;
 use super::{Status, VerdictFlags};
 use crate::ops::compare::{Request, run as compare};
 use crate::view;
@@ -17,6 +18,7 @@ use crate::view;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples: kfdesign compare params.json other_day.csv --report compare.html; kfdesign compare \
                   imu.yaml log.bag --parameters")]
+#[command(mut_arg("plot", |plot| plot.help("Allan curve and spectral ratio of every axis")))]
 pub struct Args {
     #[command(flatten)]
     request: Request,
@@ -26,9 +28,8 @@ pub struct Args {
     /// One HTML page with tables and figures
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
-    /// Allan curve and spectral ratio of every axis
-    #[arg(long, value_name = "FILE.svg")]
-    plot: Option<PathBuf>,
+    #[command(flatten)]
+    plot: Plot,
     /// One JSON document on stdout
     #[arg(long)]
     json: bool,
@@ -37,13 +38,12 @@ pub struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
-    let outputs =
-        [("-o", &args.output, Kind::Json), ("--report", &args.report, Kind::Html), ("--plot", &args.plot, Kind::Svg)];
+    let outputs = [("-o", &args.output, Kind::Json), ("--report", &args.report, Kind::Html), args.plot.output()];
     files::check(&outputs, &[&args.request.params, &args.request.log])?;
     let (result, unit) = compare(&args.request)?;
     files::write_json(args.output.as_deref(), &result)?;
     let mut report = view::compare::compare(&result, &unit);
-    files::write_plot(args.plot.as_deref(), "Model and log", &report)?;
+    args.plot.write("Model and log", &report)?;
     files::write_page(args.report.as_deref(), &report)?;
     let status = args.judging.status([result.verdict]);
     if args.json {

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::output::with_flags;
 use crate::export::atomic;
-use crate::report::{Report, html};
+use crate::report::{Report, html, print};
 
 /// Endings of pages, pictures and binary tables, which no other program reads as a text of parameters.
 const NO_TEXT: [&str; 9] = ["html", "htm", "svg", "png", "jpg", "pdf", "npy", "csv", "gz"];
@@ -16,7 +16,8 @@ const NO_TEXT: [&str; 9] = ["html", "htm", "svg", "png", "jpg", "pdf", "npy", "c
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Json,
-    Svg,
+    /// Figures, in the format of the ending.
+    Plot,
     Html,
     Xml,
     /// In the format of its ending.
@@ -30,7 +31,7 @@ impl Kind {
     fn endings(self) -> (&'static [&'static str], &'static str) {
         match self {
             Kind::Json => (&["json"], "JSON"),
-            Kind::Svg => (&["svg"], "SVG"),
+            Kind::Plot => (&print::ENDINGS, "SVG, PDF or PNG"),
             Kind::Html => (&["html", "htm"], "an HTML page"),
             Kind::Xml => (&["xml"], "JUnit XML"),
             Kind::Table | Kind::Other => (&[], "text"),
@@ -106,12 +107,6 @@ pub(super) fn write_json<T: Serialize>(path: Option<&Path>, document: &T) -> any
     let mut text = serde_json::to_string_pretty(document)?;
     text.push('\n');
     Ok(atomic::write(path, text.as_bytes())?)
-}
-
-/// The figures, under `title`, where a file for them is named.
-pub(super) fn write_plot(path: Option<&Path>, title: &str, report: &Report<'_>) -> anyhow::Result<()> {
-    let Some(path) = path else { return Ok(()) };
-    Ok(atomic::write(path, report.sheet(title).as_bytes())?)
 }
 
 /// The page, where a file for it is named.

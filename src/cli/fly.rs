@@ -1,10 +1,9 @@
 //! `kfdesign fly`.
 
-use std::path::PathBuf;
-
 use super::Status;
 use super::files::{self, Kind};
 use super::output::{print_json, print_report};
+use super::plot::Plot;
 use crate::ops::fly::{Request, run as fly};
 use crate::view;
 
@@ -15,12 +14,12 @@ use crate::view;
     (relative to the earth); elevator, aileron, \
     rudder, throttle; gusts; what the sensors measure (gyro_x … is relative to inertial space); truth of gyro and \
     accelerometer; surface rates.")]
+#[command(mut_arg("plot", |plot| plot.help("Figures of the first run: attitude, rates, surfaces with their stops, gusts, way over the ground, height")))]
 pub struct Args {
     #[command(flatten)]
     request: Request,
-    /// Figures of the first run: attitude, rates, surfaces with their stops, gusts, way over the ground, height
-    #[arg(long, value_name = "FILE.svg")]
-    plot: Option<PathBuf>,
+    #[command(flatten)]
+    plot: Plot,
     /// One JSON document on stdout
     #[arg(long)]
     json: bool,
@@ -28,11 +27,11 @@ pub struct Args {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let request = &args.request;
-    let outputs = [("-o", &request.output, Kind::Table), ("--plot", &args.plot, Kind::Svg)];
+    let outputs = [("-o", &request.output, Kind::Table), args.plot.output()];
     files::check(&outputs, &[&request.flight])?;
-    let done = fly(request, args.plot.is_some())?;
+    let done = fly(request, args.plot.wanted())?;
     let mut report = view::fly::fly(&done.report, &done.header, done.lines.as_ref(), &done.stops);
-    files::write_plot(args.plot.as_deref(), &format!("Flight of {}", done.report.airplane), &report)?;
+    args.plot.write(&format!("Flight of {}", done.report.airplane), &report)?;
     if args.json {
         print_json(&done.report)?;
     } else {

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::Status;
 use super::files::{self, Kind};
 use super::output::{print_json, print_report, say};
+use super::plot::Plot;
 use crate::export::atomic;
 use crate::ops::identify::{Request, run as identify};
 use crate::params::Params;
@@ -18,6 +19,7 @@ use crate::view;
 #[command(
     after_help = "Example: kfdesign identify static.csv --unit deg/s --rate 100 -o params.json --report identify.html"
 )]
+#[command(mut_arg("plot", |plot| plot.help("Allan curve of every axis with the fitted components")))]
 pub struct Args {
     #[command(flatten)]
     request: Request,
@@ -27,24 +29,22 @@ pub struct Args {
     /// One HTML page with tables and figures
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
-    /// Allan curve of every axis with the fitted components
-    #[arg(long, value_name = "FILE.svg")]
-    plot: Option<PathBuf>,
+    #[command(flatten)]
+    plot: Plot,
     /// One JSON document on stdout
     #[arg(long)]
     json: bool,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
-    let outputs =
-        [("-o", &args.output, Kind::Json), ("--report", &args.report, Kind::Html), ("--plot", &args.plot, Kind::Svg)];
+    let outputs = [("-o", &args.output, Kind::Json), ("--report", &args.report, Kind::Html), args.plot.output()];
     files::check(&outputs, &args.request.logs.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
     let done = identify(&args.request)?;
     if let Some(path) = &args.output {
         atomic::write(path, done.params.to_json().as_bytes())?;
     }
     let mut report = view::identify::identify(&done.params, &done.axes, done.shared.as_ref());
-    files::write_plot(args.plot.as_deref(), &format!("{}: overlapping Allan deviation", done.name()), &report)?;
+    args.plot.write(&format!("{}: overlapping Allan deviation", done.name()), &report)?;
     files::write_page(args.report.as_deref(), &report)?;
     let status = status(&done.params, args.output.as_deref());
     if args.json {

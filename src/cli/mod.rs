@@ -20,6 +20,7 @@ pub mod man;
 pub mod montecarlo;
 pub mod output;
 pub mod plan;
+mod plot;
 pub mod replay;
 pub mod schema;
 mod signals;

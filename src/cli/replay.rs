@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::files::{self, Kind};
 use super::output::{print_json, print_report};
+use super::plot::Plot;
 use super::{Status, VerdictFlags};
 use crate::consistency::Verdict;
 use crate::filter::AttitudeDesign;
@@ -17,15 +18,15 @@ use crate::view;
 /// unless --allow-inconclusive.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: kfdesign replay filter.json log.csv -o estimates.csv --innovations")]
+#[command(mut_arg("plot", |plot| plot.help("Figures of every axis")))]
 pub struct Args {
     #[command(flatten)]
     request: Request,
     /// One HTML page with tables and figures
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
-    /// Figures of every axis
-    #[arg(long, value_name = "FILE.svg")]
-    plot: Option<PathBuf>,
+    #[command(flatten)]
+    plot: Plot,
     /// One JSON document on stdout
     #[arg(long)]
     json: bool,
@@ -36,13 +37,9 @@ pub struct Args {
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let request = &args.request;
     request.check()?;
-    let outputs = [
-        ("-o", &request.output, Kind::Table),
-        ("--report", &args.report, Kind::Html),
-        ("--plot", &args.plot, Kind::Svg),
-    ];
+    let outputs = [("-o", &request.output, Kind::Table), ("--report", &args.report, Kind::Html), args.plot.output()];
     files::check(&outputs, &[&request.filter, &request.log])?;
-    for (option, given) in [("report", args.report.is_some()), ("plot", args.plot.is_some())] {
+    for (option, given) in [("report", args.report.is_some()), ("plot", args.plot.wanted())] {
         if given && AttitudeDesign::is(&request.filter) {
             return Err(linear_only(option, &request.filter));
         }
@@ -50,7 +47,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     match replay(request)? {
         Done::Linear(result, unit) => {
             let mut report = view::replay::replay(&result, &request.filter.display().to_string(), unit.as_ref());
-            files::write_plot(args.plot.as_deref(), "Replay", &report)?;
+            args.plot.write("Replay", &report)?;
             files::write_page(args.report.as_deref(), &report)?;
             let status = args.judging.status([result.verdict]);
             if args.json {

@@ -6,6 +6,7 @@ use anyhow::bail;
 
 use super::files::{self, Kind};
 use super::output::{print_json, print_report};
+use super::plot::Plot;
 use super::{Status, VerdictFlags};
 use crate::export::atomic;
 use crate::ops::tune::attitude::linear_only;
@@ -20,6 +21,7 @@ use crate::view;
 /// 1).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: kfdesign tune data/params.json -o filter.json --report design.html")]
+#[command(mut_arg("plot", |plot| plot.help("Figure of the predicted sigma of every axis")))]
 pub struct Args {
     #[command(flatten)]
     request: Request,
@@ -29,9 +31,8 @@ pub struct Args {
     /// One HTML page with tables and figures
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
-    /// Figure of the predicted sigma of every axis
-    #[arg(long, value_name = "FILE.svg")]
-    plot: Option<PathBuf>,
+    #[command(flatten)]
+    plot: Plot,
     /// One JSON document on stdout: the filter, the reports, the verification, and what --truth and --log gave
     #[arg(long)]
     json: bool,
@@ -49,8 +50,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if args.request.params.is_none() {
         return rank(args);
     }
-    let outputs =
-        [("-o", &args.output, Kind::Json), ("--report", &args.report, Kind::Html), ("--plot", &args.plot, Kind::Svg)];
+    let outputs = [("-o", &args.output, Kind::Json), ("--report", &args.report, Kind::Html), args.plot.output()];
     files::check(&outputs, &args.request.inputs())?;
     match tune(&args.request)? {
         Done::Linear(done) => linear(args, &done, &outputs),
@@ -64,7 +64,7 @@ fn linear(args: &Args, done: &Linear, outputs: &[files::Output<'_>]) -> anyhow::
     }
     let shown = done.shown();
     let mut report = view::tune::tune(&shown);
-    files::write_plot(args.plot.as_deref(), "Tuned filter", &report)?;
+    args.plot.write("Tuned filter", &report)?;
     files::write_page(args.report.as_deref(), &report)?;
     let replays = done.replays.iter().map(|replay| replay.verdict);
     let status = if done.verified { args.judging.status(replays) } else { Status::CheckFailed };
@@ -84,7 +84,7 @@ fn linear(args: &Args, done: &Linear, outputs: &[files::Output<'_>]) -> anyhow::
 }
 
 fn of_attitude(args: &Args, tuned: &TunedAttitude) -> anyhow::Result<Status> {
-    for (option, given) in [("report", args.report.is_some()), ("plot", args.plot.is_some())] {
+    for (option, given) in [("report", args.report.is_some()), ("plot", args.plot.wanted())] {
         if given {
             return Err(linear_only(option));
         }

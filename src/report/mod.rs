@@ -4,6 +4,7 @@
 pub mod allan;
 pub mod figure;
 pub mod html;
+pub mod print;
 pub mod terminal;
 
 use std::fmt;
@@ -106,6 +107,10 @@ struct Table {
     caption: String,
     columns: Vec<Column>,
     rows: Vec<Vec<String>>,
+    /// The column that says what came of a row, where a page folds the rows that pass.
+    folded: Option<usize>,
+    /// How many rows pass.
+    passed: usize,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -146,6 +151,10 @@ struct Figure<'a> {
 
 /// Names of columns that say what came of a row.
 const VERDICTS: [&str; 2] = ["result", "verdict"];
+/// What a row says that needs no attention.
+const PASS: &str = "pass";
+/// Fewer rows that pass are seen at a glance: folding them would hide more than it shows.
+const FEWEST_FOLDED: usize = 4;
 /// A column with a longer cell than this is one of sentences.
 const LONGEST_WORD: usize = 32;
 
@@ -178,8 +187,11 @@ impl Table {
             let align = Align::of(rows.iter().filter_map(|row| row.get(i)).map(String::as_str));
             Column { name, align, importance: if key { Importance::Key } else { Importance::Usual } }
         };
-        let columns = header.iter().enumerate().map(column).collect();
-        Table { caption, columns, rows }
+        let columns: Vec<Column> = header.iter().enumerate().map(column).collect();
+        let judged = columns.iter().position(|column| VERDICTS.contains(&column.name.as_str()));
+        let passes = |row: &&Vec<String>| judged.is_some_and(|i| row.get(i).is_some_and(|cell| cell == PASS));
+        let passed = rows.iter().filter(passes).count();
+        Table { caption, columns, folded: judged.filter(|_| passed >= FEWEST_FOLDED), passed, rows }
     }
 }
 

@@ -4,6 +4,7 @@ pub mod bridge;
 pub mod check;
 pub mod correlation;
 pub mod cosine;
+pub mod course;
 pub(crate) mod fourier;
 pub mod lines;
 pub mod smoothing;

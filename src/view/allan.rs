@@ -82,6 +82,35 @@ fn of_axis(axis: &AxisCurve) -> Section<'_> {
         .figure("", || figure(axis))
 }
 
+/// Curves of several logs: a panel for each axis, by its name, or one for all. `logs`: names, each with its axes.
+pub fn overlay<'a>(logs: &'a [(String, Vec<AxisCurve>)], one_panel: bool) -> Vec<Section<'a>> {
+    let curves = || logs.iter().flat_map(|(log, axes)| axes.iter().map(move |axis| (log, axis)));
+    let mut panels: Vec<&str> = Vec::new();
+    for (_, axis) in curves() {
+        if !panels.contains(&axis.name.as_str()) {
+            panels.push(&axis.name);
+        }
+    }
+    let panel = move |title: String, only: Option<&'a str>| {
+        let shown = curves().filter(move |(_, axis)| only.is_none_or(|name| axis.name == name));
+        let named = shown.map(move |(log, axis)| match (logs.len(), only) {
+            (1, _) => (axis.name.clone(), &axis.curve),
+            (_, Some(_)) => (log.clone(), &axis.curve),
+            (_, None) => (format!("{log}, {}", axis.name), &axis.curve),
+        });
+        let Some(unit) = curves().next().map(|(_, axis)| &axis.unit) else { return String::new() };
+        report::allan::overlay(&title, &named.collect::<Vec<_>>(), unit)
+    };
+    let name = curves().next().map_or("deviation", |(_, axis)| axis.curve.deviation.name());
+    if one_panel {
+        return vec![Section::new("").figure("", move || panel(name.into(), None))];
+    }
+    panels
+        .into_iter()
+        .map(|only| Section::new("").figure("", move || panel(format!("{only}: {name}"), Some(only))))
+        .collect()
+}
+
 /// The curve of one axis.
 pub(super) fn figure(axis: &AxisCurve) -> String {
     report::allan::figure(&axis.name, &axis.curve, axis.fit.as_ref().ok(), &axis.unit)

@@ -2,8 +2,11 @@
 
 use super::or_dash;
 use crate::input::inspect::{ColumnInfo, Inventory, TopicInfo};
+use crate::report::figure::{self, Curve};
 use crate::report::{Report, Section};
-use crate::units::{Quantity, Unit, duration};
+use crate::signal::check::{Finding, FindingKind};
+use crate::signal::course::{AVERAGED, Course};
+use crate::units::{Quantity, Unit, digits, duration};
 
 /// `all`: every topic with its columns, not only those with a gyro or an accelerometer.
 pub fn info<'a>(name: &str, found: &Inventory, all: bool) -> Report<'a> {
@@ -30,6 +33,76 @@ pub fn info<'a>(name: &str, found: &Inventory, all: bool) -> Report<'a> {
         .paragraphs(topics.map(columns).collect())
         .findings("note", notes.collect());
     Report { title: name.into(), sections: vec![section], ..Report::default() }
+}
+
+/// The log over time, a figure for each axis.
+pub fn course(course: &Course) -> Report<'_> {
+    let axes = 0..course.recording.axes.len();
+    let section = axes.fold(Section::new(""), |section, i| section.figure("", move || of_axis(course, i)));
+    Report { title: course.recording.name.clone(), sections: vec![section], ..Report::default() }
+}
+
+fn of_axis(course: &Course, i: usize) -> String {
+    let Course { recording, check, averages } = course;
+    let axis = &recording.axes[i];
+    let dt = recording.dt();
+    let mut gaps = recording.gaps.iter().peekable();
+    let mut missing = 0;
+    let mut points = Vec::with_capacity(axis.values.len());
+    let mut average = Vec::with_capacity(axis.values.len());
+    for (k, (value, mean)) in axis.values.iter().zip(&averages[i]).enumerate() {
+        while let Some(gap) = gaps.next_if(|gap| gap.index == k) {
+            // nothing is drawn over a gap
+            points.push(((k as u64 + missing) as f64 * dt, f64::NAN));
+            average.push(((k as u64 + missing) as f64 * dt, f64::NAN));
+            missing += gap.missing;
+        }
+        let time = (k as u64 + missing) as f64 * dt;
+        points.push((time, axis.unit.from_si(*value)));
+        average.push((time, axis.unit.from_si(*mean)));
+    }
+    let here = |finding: &&Finding| finding.axis.as_ref().is_none_or(|name| *name == axis.name);
+    let place = |finding: &Finding| {
+        let what = of_place(finding.kind)?;
+        let times = if finding.count > 1 { format!(", first of {}", finding.count) } else { String::new() };
+        Some((finding.first_s, format!("{what} at {} s{times}", digits(finding.first_s))))
+    };
+    figure::course(&figure::Course {
+        title: format!("{}: {}", axis.name, recording.name),
+        quantity: axis.name.clone(),
+        unit: axis.unit.text().into(),
+        points,
+        average: Curve {
+            label: format!("mean of {AVERAGED} samples, {} s", digits(AVERAGED as f64 * dt)),
+            points: average,
+        },
+        findings: check.findings.iter().filter(here).filter_map(place).collect(),
+    })
+}
+
+/// In words, where a finding has a place in the log.
+fn of_place(kind: FindingKind) -> Option<&'static str> {
+    Some(match kind {
+        FindingKind::Gap => "gap",
+        FindingKind::RepeatedStamp => "repeated stamp",
+        FindingKind::BackwardStamp => "stamp backward",
+        FindingKind::ZeroRow => "row of zeros",
+        FindingKind::RepeatedRow => "repeated row",
+        FindingKind::Nan => "no number",
+        FindingKind::Overflow => "overflow",
+        FindingKind::Stuck => "stuck",
+        FindingKind::Saturated => "saturated",
+        FindingKind::Outlier => "outlier",
+        FindingKind::Motion => "motion",
+        FindingKind::Jitter
+        | FindingKind::TimeUnit
+        | FindingKind::Rate
+        | FindingKind::Quantised
+        | FindingKind::Calm
+        | FindingKind::Temperature
+        | FindingKind::Topic
+        | FindingKind::Damaged => return None,
+    })
 }
 
 fn columns(topic: &TopicInfo) -> String {

@@ -144,3 +144,53 @@ fn complaints_are_one_line_and_leave_nothing() {
     assert_eq!(bench.read("log.csv"), log("x (deg/s)", &nist()));
     assert_eq!(bench.files(), ["log.csv", "one.csv"]);
 }
+
+/// Two logs: a panel for each axis with a curve for each log, or one panel for all; a document is of one log.
+#[test]
+fn several_logs_share_a_panel() {
+    let bench = Bench::new();
+    let values = congruential(1, 6000);
+    for (name, values) in [("a.csv", &values[..3000]), ("b.csv", &values[3000..])] {
+        let rows = values.chunks(2).map(|p| format!("{:?},{:?}\n", p[0], p[1]));
+        bench.file(name, format!("x (rad/s),y (rad/s)\n{}", rows.collect::<String>()));
+    }
+    let curves = |file: &str| {
+        bench.read(file).split("<svg y=").skip(1).map(|f| f.matches(" class=\"kf4").count()).collect::<Vec<_>>()
+    };
+    let text = bench.ok("allan a.csv b.csv --rate 100 --plot two.svg");
+    assert!(text.contains("a.csv: overlapping") && text.contains("b.csv: overlapping"), "{text}");
+    // a band for each curve, and one in the legend
+    assert_eq!(curves("two.svg"), [3, 3]);
+    let svg = bench.read("two.svg");
+    for word in ["<title>x: overlapping", "<title>y: overlapping", "\na.csv\n", "\nb.csv\n"] {
+        assert!(svg.contains(word), "{word}");
+    }
+    bench.ok("allan a.csv b.csv --rate 100 --plot one.svg --overlay");
+    assert_eq!(curves("one.svg"), [5]);
+    assert!(bench.read("one.svg").contains("\nb.csv, y\n"));
+    bench.ok("allan a.csv --rate 100 --plot axes.svg --overlay");
+    assert_eq!(curves("axes.svg"), [3]);
+    for refused in ["allan a.csv b.csv --rate 100 --json", "allan a.csv --rate 100 --overlay"] {
+        let out = bench.run(refused);
+        assert_eq!((out.status, out.stderr.lines().count()), (2, 1), "{refused}: {}", out.stderr);
+    }
+}
+
+/// The log over time: moving average, a line at what the log check found, nothing drawn over a gap.
+#[test]
+fn a_log_is_drawn_over_time() {
+    let bench = Bench::new();
+    let time = |k: usize| if k < 700 { 0.01 * k as f64 } else { 0.01 * k as f64 + 5.0 };
+    let rows = congruential(1, 1500).into_iter().enumerate().map(|(k, y)| format!("{:.2},{y:?}\n", time(k)));
+    bench.file("log.csv", format!("t (s),x (deg/s)\n{}", rows.collect::<String>()));
+    bench.ok("info log.csv --plot log.svg");
+    let svg = bench.read("log.svg");
+    for word in ["x: log.csv", "mean of 101 samples, 1.010 s", "a: gap at 7.0", "x (deg/s)"] {
+        assert!(svg.contains(word), "{word}");
+    }
+    // log and average in two pieces each, and a sample in the legend
+    assert_eq!(svg.matches("<polyline class=\"kf12\"").count(), 3);
+    assert_eq!(svg.matches("<polyline class=\"kf20\"").count(), 3);
+    let out = bench.run("info none.csv --plot log.eps");
+    assert!(out.status == 2 && out.stderr.contains("--plot writes SVG, PDF or PNG"), "{}", out.stderr);
+}

@@ -35,8 +35,9 @@ fn allan_figure_shows_the_curve_of_the_record() {
     let model = NoiseModel { terms: terms().to_vec() };
     let svg = report::allan::figure("gyro_x", &curve, Some(&model), &unit);
     save("allan-record.svg", &svg);
-    // one dot a point and one in the legend
-    assert_eq!(svg.matches("<circle").count(), curve.points.len() + 1);
+    // one dot a point, one in the legend, and a ring where N is read
+    assert_eq!(svg.matches("<circle").count(), curve.points.len() + 2);
+    assert!(svg.contains("N = 0.0562 deg/s/√Hz") && svg.contains("σ = 0.0281 deg/s, 60.00 s"));
     assert!(svg.contains("deviation (deg/s)") && svg.contains("white noise"));
     // without a model there is nothing fitted
     let bare = report::allan::figure("gyro_x", &curve, None, &unit);

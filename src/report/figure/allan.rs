@@ -30,6 +30,19 @@ pub struct Allan {
     /// The fitted sum of the components.
     pub total: Option<Curve>,
     pub components: Vec<Curve>,
+    /// Where parameters are read.
+    pub marks: Vec<AllanMark>,
+}
+
+/// A parameter at the point of the curve that shows it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AllanMark {
+    pub tau_s: f64,
+    pub deviation: f64,
+    /// "N".
+    pub word: String,
+    /// The component it belongs to, or none: the total.
+    pub component: Option<usize>,
 }
 
 /// Log-log figure of one axis.
@@ -68,9 +81,35 @@ pub fn allan(data: &Allan) -> String {
     for (k, curve) in data.components.iter().enumerate() {
         chart.legend_line(Class::Line(k + 2), &curve.label);
     }
+    for mark in &data.marks {
+        let series = mark.component.map_or(1, |k| k + 2);
+        chart.tag(Some(series), (mark.tau_s, mark.deviation), &mark.word);
+    }
     for (low, high, noise) in stretches(&data.points) {
         chart.stretch(low, high, noise);
     }
+    chart.render()
+}
+
+/// Curves of several axes or logs in one panel: what differs between them. All values in `unit`.
+pub fn allan_overlay(title: &str, unit: &str, curves: &[(String, Vec<AllanPoint>)]) -> String {
+    let points = || curves.iter().flat_map(|(_, points)| points);
+    let all = Allan { points: points().cloned().collect(), ..Allan::default() };
+    let mut chart = Chart::new(
+        title,
+        &format!("Deviations of {} curves against averaging time on logarithmic axes.", curves.len()),
+        Axis { name: "averaging time τ".into(), unit: "s".into(), scale: Scale::log(points().map(|p| p.tau_s)) },
+        Axis { name: "deviation".into(), unit: unit.into(), scale: y_scale(&all) },
+    );
+    chart.plot_height(290);
+    for (k, (_, points)) in curves.iter().enumerate() {
+        chart.band(k, points.iter().map(|p| (p.tau_s, p.lower, p.upper)).collect());
+    }
+    for (k, (label, points)) in curves.iter().enumerate() {
+        chart.line(Class::Line(k), points.iter().map(|p| (p.tau_s, p.deviation)).collect());
+        chart.legend_line(Class::Line(k), label);
+    }
+    chart.legend_band(5, "95 % interval");
     chart.render()
 }
 

@@ -26,21 +26,45 @@ const COLUMNS: usize = 700;
 /// One thing in the plot.
 #[derive(Clone, Debug)]
 enum Mark {
-    Line { class: Class, points: Vec<(f64, f64)> },
-    Band { series: usize, edges: Vec<(f64, f64, f64)> },
-    Dots { series: usize, points: Vec<(f64, f64)> },
-    Stems { series: usize, points: Vec<(f64, f64)> },
-    Bars { bars: Vec<(f64, f64, f64)> },
-    Level { class: Class, y: f64 },
-    Upright { class: Class, x: f64 },
+    Line {
+        class: Class,
+        points: Vec<(f64, f64)>,
+    },
+    Band {
+        series: usize,
+        edges: Vec<(f64, f64, f64)>,
+    },
+    Dots {
+        series: usize,
+        points: Vec<(f64, f64)>,
+    },
+    Stems {
+        series: usize,
+        points: Vec<(f64, f64)>,
+    },
+    Bars {
+        bars: Vec<(f64, f64, f64)>,
+    },
+    Level {
+        class: Class,
+        y: f64,
+    },
+    Upright {
+        class: Class,
+        x: f64,
+    },
+    /// A word beside a point, which may have a ring.
+    Tag {
+        ring: Option<usize>,
+        at: (f64, f64),
+        word: String,
+    },
 }
 
 #[derive(Clone, Copy, Debug)]
 enum Sample {
     Line(Class),
     Band(usize),
-    /// A band inside a band.
-    Bands(usize),
     Dots(usize),
     Bar,
 }
@@ -91,6 +115,10 @@ impl Chart {
         self.marks.push(Mark::Line { class, points: thin(points, &self.x.scale) });
     }
 
+    pub(super) fn x_ends(&self) -> (f64, f64) {
+        self.x.scale.ends()
+    }
+
     /// (x, lower, upper).
     pub(super) fn band(&mut self, series: usize, edges: Vec<(f64, f64, f64)>) {
         self.marks.push(Mark::Band { series, edges: thin_band(edges, &self.x.scale) });
@@ -117,16 +145,24 @@ impl Chart {
         self.marks.push(Mark::Upright { class, x });
     }
 
+    /// Both ends of a band as lines, which stay visible under whatever was drawn before them.
+    pub(super) fn edges(&mut self, class: Class, edges: &[(f64, f64, f64)]) {
+        self.line(class, edges.iter().map(|e| (e.0, e.1)).collect());
+        self.line(class, edges.iter().map(|e| (e.0, e.2)).collect());
+    }
+
+    /// A word beside a point, and a ring around it in the colour of a series; nothing outside the plot.
+    pub(super) fn tag(&mut self, ring: Option<usize>, at: (f64, f64), word: &str) {
+        let word = word.chars().map(style::printable).collect();
+        self.marks.push(Mark::Tag { ring, at, word });
+    }
+
     pub(super) fn legend_line(&mut self, class: Class, label: &str) {
         self.entry(Sample::Line(class), label);
     }
 
     pub(super) fn legend_band(&mut self, series: usize, label: &str) {
         self.entry(Sample::Band(series), label);
-    }
-
-    pub(super) fn legend_bands(&mut self, series: usize, label: &str) {
-        self.entry(Sample::Bands(series), label);
     }
 
     pub(super) fn legend_dots(&mut self, series: usize, label: &str) {
@@ -192,6 +228,7 @@ impl Chart {
         for mark in &self.marks {
             self.draw_mark(&mut chart, mark)?;
         }
+        self.draw_tags(root, &chart)?;
         self.draw_stretches(root, &chart)?;
         if self.marks.iter().all(|m| m.is_empty(&self.x.scale, &self.y.scale)) {
             let (xs, ys) = chart.plotting_area().get_pixel_range();
@@ -251,6 +288,28 @@ impl Chart {
                 });
                 chart.draw_series(rectangles)?;
             }
+            Mark::Tag { .. } => {}
+        }
+        Ok(())
+    }
+
+    /// Over everything else.
+    fn draw_tags(&self, root: &Area<'_>, chart: &Plot<'_, '_>) -> Drawn<()> {
+        let (xs, ys) = chart.plotting_area().get_pixel_range();
+        for mark in &self.marks {
+            let Mark::Tag { ring, at, word } = mark else { continue };
+            if !inside(*at, &self.x.scale, &self.y.scale) {
+                continue;
+            }
+            let x = xs.start + (self.x.scale.to_unit(at.0) * f64::from(xs.end - xs.start)).round() as i32;
+            let y = ys.end - (self.y.scale.to_unit(at.1) * f64::from(ys.end - ys.start)).round() as i32;
+            if let Some(series) = ring {
+                root.draw(&Circle::new((x, y), 48, Class::Thread(*series).token()))?;
+            }
+            // away from the nearer end of the plot
+            let (side, anchor) = if x > (xs.start + xs.end) / 2 { (-75, HPos::Right) } else { (75, HPos::Left) };
+            let down = if y - ys.start < 300 { 110 } else { -110 };
+            text(root, word, Class::Tag, LABEL_SIZE, (x + side, y + down), anchor, VPos::Center)?;
         }
         Ok(())
     }
@@ -296,7 +355,7 @@ impl Mark {
             }
             Mark::Band { edges, .. } => edges.is_empty(),
             Mark::Bars { bars } => bars.is_empty(),
-            Mark::Level { .. } | Mark::Upright { .. } => true,
+            Mark::Level { .. } | Mark::Upright { .. } | Mark::Tag { .. } => true,
         }
     }
 }
@@ -308,11 +367,6 @@ fn draw_entry(root: &Area<'_>, sample: Sample, label: &str, (x, y): (i32, i32)) 
     match sample {
         Sample::Line(class) => root.draw(&line(class))?,
         Sample::Band(series) => root.draw(&swatch(Class::Band(series)))?,
-        Sample::Bands(series) => {
-            root.draw(&swatch(Class::Band(series)))?;
-            let inner = [(x, y - 22), (x + SAMPLE, y + 22)];
-            root.draw(&Rectangle::new(inner, Class::Band(series).token().filled()))?;
-        }
         Sample::Bar => root.draw(&swatch(Class::Bar))?,
         Sample::Dots(series) => root.draw(&dot(series))?,
     }

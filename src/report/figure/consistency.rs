@@ -91,23 +91,29 @@ pub struct Periodogram {
     pub band_label: String,
 }
 
-/// Cumulative periodogram with the straight line of white noise and its band.
+/// How far the cumulative periodogram is above the straight line of white noise, with the band.
 pub fn cumulative_periodogram(data: &Periodogram) -> String {
     let highest = data.points.iter().map(|p| p.0).filter(|f| f.is_finite()).fold(0.0, f64::max);
     let end = if highest > 0.0 { highest } else { 1.0 };
+    let excess: Vec<(f64, f64)> = data.points.iter().map(|&(f, share)| (f, share - f / end)).collect();
+    let w = data.half_width;
+    let reach = excess.iter().map(|p| p.1.abs()).filter(|v| v.is_finite()).fold(w.abs(), f64::max);
+    let reach = if reach > 0.0 && reach.is_finite() { 1.15 * reach } else { 1.0 };
     let mut chart = Chart::new(
         &data.title,
-        &format!("Cumulative periodogram up to {highest:.3e} Hz with a band of half width {:.4}.", data.half_width),
+        &format!(
+            "Cumulative periodogram up to {highest:.3e} Hz, less that of white noise, with a band of half width {w:.4}."
+        ),
         Axis { name: "frequency".into(), unit: "Hz".into(), scale: Scale::linear_between(0.0, end, 6.0) },
-        Axis { name: "cumulative power".into(), unit: "fraction".into(), scale: Scale::linear_between(0.0, 1.0, 5.0) },
+        Axis {
+            name: "power up to a frequency, less that of white noise".into(),
+            unit: "fraction".into(),
+            scale: Scale::linear_between(-reach, reach, 5.0),
+        },
     );
-    let w = data.half_width;
-    // with corners where an edge leaves the plot
-    let mut corners = [0.0, w.clamp(0.0, 1.0), (1.0 - w).clamp(0.0, 1.0), 1.0];
-    corners.sort_by(f64::total_cmp);
-    chart.band(5, corners.iter().map(|&t| (t * end, t - w, t + w)).collect());
-    chart.line(Class::Expected, vec![(0.0, 0.0), (end, 1.0)]);
-    chart.line(Class::Line(0), data.points.clone());
+    chart.band(5, vec![(0.0, -w, w), (end, -w, w)]);
+    chart.level(Class::Expected, 0.0);
+    chart.line(Class::Line(0), excess);
     chart.legend_line(Class::Line(0), "innovations");
     chart.legend_line(Class::Expected, "white");
     chart.legend_band(5, &data.band_label);
@@ -130,8 +136,8 @@ pub struct Nees {
     pub band_label: String,
 }
 
-/// Ratio of the largest to the smallest value from which the NEES has a logarithmic axis.
-const WIDE: f64 = 15.0;
+/// Ratio of the largest to the smallest value from which NEES, and errors over claims, have a logarithmic axis.
+pub(super) const WIDE: f64 = 15.0;
 
 /// Average NEES with its band; a few times stand beside each other as dots, many are a line over time.
 pub fn nees(data: &Nees) -> String {

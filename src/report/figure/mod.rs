@@ -9,6 +9,7 @@ mod budget;
 mod chart;
 mod closed_loop;
 mod consistency;
+mod course;
 mod error;
 mod flight;
 mod lines;
@@ -19,18 +20,20 @@ mod style;
 mod trace;
 mod worth;
 
-pub use allan::{Allan, AllanPoint, allan};
+pub use allan::{Allan, AllanMark, AllanPoint, allan, allan_overlay};
 pub use budget::{BudgetItem, error_budget};
 pub use closed_loop::{Found, Nyquist, OverLog, found, nyquist, over_log};
 pub use consistency::{
     Autocorrelation, Histogram, Nees, Periodogram, autocorrelation, cumulative_periodogram, nees, nis_histogram,
 };
+pub use course::{Course, course};
 pub use error::{Component, Errors, Rms, errors, rms};
 pub use flight::{Envelope, TimeLines, Track, time_lines, track};
 pub use lines::{Lines, lines};
 pub use ratio::{SpectrumRatio, spectrum_ratio};
 pub use sheet::sheet;
-pub use style::style_sheet;
+pub(super) use style::UNITS;
+pub use style::{light_style_sheet, style_sheet};
 pub use trace::{Estimate, Innovations, Sigma, SigmaState, estimate, innovations, sigma};
 pub use worth::{Worth, worth};
 

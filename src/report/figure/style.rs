@@ -7,7 +7,7 @@
 use plotters::style::RGBColor;
 
 /// plotters rounds to whole units; ten of ours make one pixel of the finished figure.
-pub(super) const UNITS: i32 = 10;
+pub(in crate::report) const UNITS: i32 = 10;
 /// Width of every figure, px: readable at phone width, two side by side on a desk.
 pub(super) const WIDTH: i32 = 440;
 
@@ -28,6 +28,10 @@ pub(super) enum Class {
     /// What is known to be true.
     Truth,
     Bar,
+    /// A word beside a point.
+    Tag,
+    /// Dense data behind a line.
+    Cloud,
     Line(usize),
     /// A hair line, for dense data.
     Thread(usize),
@@ -37,7 +41,7 @@ pub(super) enum Class {
     Thin(usize),
 }
 
-const PLAIN: [Class; 10] = [
+const PLAIN: [Class; 12] = [
     Class::Title,
     Class::Label,
     Class::Note,
@@ -48,6 +52,8 @@ const PLAIN: [Class; 10] = [
     Class::Expected,
     Class::Truth,
     Class::Bar,
+    Class::Tag,
+    Class::Cloud,
 ];
 
 /// Distinct series; further ones start again.
@@ -99,6 +105,8 @@ fn rules(theme: &Theme, series: &[&str; SERIES]) -> String {
     css += &fill(Class::Title, ink);
     css += &fill(Class::Label, muted);
     css += &fill(Class::Note, muted);
+    css += &fill(Class::Tag, ink);
+    css += &stroke(Class::Cloud, series[5]);
     css += &stroke(Class::Grid, faint);
     css += &stroke(Class::FineGrid, faint);
     css += &stroke(Class::Axis, muted);
@@ -116,13 +124,26 @@ fn rules(theme: &Theme, series: &[&str; SERIES]) -> String {
     css
 }
 
-/// The style sheet that every figure carries. Lengths are in figure units (`UNITS` to the pixel).
+/// The style sheet that every figure carries.
 pub fn style_sheet() -> String {
+    let mut css = light_style_sheet();
+    css += "@media (prefers-color-scheme:dark){";
+    css += &rules(&DARK_THEME, &DARK);
+    css += "}";
+    // a page printed from a dark screen is black on white
+    css += "@media print{";
+    css += &rules(&LIGHT_THEME, &LIGHT);
+    css + "}"
+}
+
+/// The same for white paper, whatever the reader's setting. Lengths are in figure units (`UNITS` to the pixel).
+pub fn light_style_sheet() -> String {
     let class = |class: Class| format!(".kf{}", class.code());
     let mut css = String::from(".kf text{font-family:\"Helvetica Neue\",Arial,sans-serif;stroke:none}");
     css += &format!("{}{{font-size:138px;font-weight:600}}", class(Class::Title));
     css += &format!("{}{{font-size:122px}}", class(Class::Label));
     css += &format!("{}{{font-size:112px}}", class(Class::Note));
+    css += &format!("{}{{font-size:122px;font-weight:600}}", class(Class::Tag));
     for (what, width, more) in [
         (Class::Grid, 8, ""),
         (Class::FineGrid, 5, ";stroke-opacity:.55"),
@@ -130,6 +151,7 @@ pub fn style_sheet() -> String {
         (Class::Bound, 12, ";stroke-dasharray:70 35"),
         (Class::Expected, 12, ";stroke-dasharray:25 25"),
         (Class::Truth, 9, ""),
+        (Class::Cloud, 8, ";stroke-opacity:.4;stroke-linejoin:round"),
     ] {
         css += &format!("{}{{fill:none;stroke-width:{width}{more}}}", class(what));
     }
@@ -143,14 +165,7 @@ pub fn style_sheet() -> String {
         css += &format!("{}{{fill:none;stroke-width:8;stroke-linejoin:round}}", class(Class::Thread(k)));
         css += &format!("{}{{fill-opacity:.17}}", class(Class::Band(k)));
     }
-    css += &rules(&LIGHT_THEME, &LIGHT);
-    css += "@media (prefers-color-scheme:dark){";
-    css += &rules(&DARK_THEME, &DARK);
-    css += "}";
-    // a page printed from a dark screen is black on white
-    css += "@media print{";
-    css += &rules(&LIGHT_THEME, &LIGHT);
-    css + "}"
+    css + &rules(&LIGHT_THEME, &LIGHT)
 }
 
 /// A finished figure: plotters' elements with classes, under a title and a description for a screen reader.

@@ -109,8 +109,10 @@ pub fn estimate(data: &Estimate) -> String {
         chart.line(Class::Truth, truth.points.iter().map(|&(t, x)| (clock.show(t), x)).collect());
     }
     chart.line(Class::Line(0), data.time_s.iter().zip(&data.estimate).map(|(&t, &x)| (clock.show(t), x)).collect());
+    // over the estimate, which hides the bands where it is rough
+    chart.edges(Class::Thread(0), &scaled(3.0));
     chart.legend_line(Class::Line(0), "estimate");
-    chart.legend_bands(0, "±1σ and ±3σ");
+    chart.legend_band(0, "±1σ and ±3σ");
     if let Some(truth) = &data.truth {
         chart.legend_line(Class::Truth, &truth.label);
     }

@@ -9,6 +9,7 @@ use crate::filter::gains::Epoch;
 use crate::montecarlo::course::AxisCourse;
 use crate::montecarlo::outcome::{Component, Innovations, LowFrequency};
 use crate::montecarlo::{AxisOutcome, Path};
+use crate::numerics::distribution::chi_square_quantile;
 use crate::report::figure::{self, Curve};
 use crate::report::{Level, Section};
 use crate::units::{Unit, digits};
@@ -156,34 +157,29 @@ impl<'a> AxisView<'a> {
         })
     }
 
-    /// One figure for the components of each unit.
-    fn rms(&self, mut section: Section<'a>) -> Section<'a> {
-        let mut units: Vec<&'a str> = Vec::new();
-        for component in &self.axis.errors {
-            if !units.contains(&component.unit.as_str()) {
-                units.push(&component.unit);
-            }
+    /// Every component over its claim.
+    fn rms(&self, section: Section<'a>) -> Section<'a> {
+        if self.axis.errors.is_empty() {
+            return section;
         }
-        for si in units {
-            let view = self.clone();
-            let caption = "Root mean square error over the runs beside the sigma that the filter claims.";
-            section = section.figure(caption, move || {
-                let (scale, unit) = view.shown(si);
-                let scaled = |values: &[f64]| values.iter().map(|v| v / scale).collect();
-                let components = view.axis.errors.iter().filter(|c| c.unit == si).map(|c| figure::Component {
-                    name: c.name.clone(),
-                    rms: scaled(&c.rms),
-                    claimed: scaled(&c.predicted_sigma),
-                });
-                figure::rms(&figure::Rms {
-                    title: view.title("errors and claims"),
-                    unit,
-                    time_s: view.axis.nees.time_s.clone(),
-                    components: components.collect(),
-                })
+        let view = self.clone();
+        let caption = "Root mean square error over the runs, over the sigma that the filter claims.";
+        section.figure(caption, move || {
+            let components = view.axis.errors.iter().map(|c| figure::Component {
+                name: c.name.clone(),
+                rms: c.rms.clone(),
+                claimed: c.predicted_sigma.clone(),
             });
-        }
-        section
+            // the mean square of normal errors as large as claimed
+            let runs = view.of.outcome.runs.count() as f64;
+            let band = [0.025, 0.975].map(|p| (chi_square_quantile(p, runs) / runs).sqrt());
+            figure::rms(&figure::Rms {
+                title: view.title("errors and claims"),
+                time_s: view.axis.nees.time_s.clone(),
+                components: components.collect(),
+                band: Some((band, "95 % at one time".into())),
+            })
+        })
     }
 
     fn error_row(&self, component: &Component) -> [String; 7] {
@@ -257,8 +253,8 @@ fn of_innovations<'a>(section: Section<'a>, innovations: &'a Innovations, title:
     if periodogram.share.is_empty() {
         return section;
     }
-    let caption = "Power of the block-averaged innovations up to each frequency: above the band there is more slow \
-                   power than the filter says, below it less.";
+    let caption = "Power of the block-averaged innovations up to each frequency, less that of white noise: above the \
+                   band there is more slow power than the filter says, below it less.";
     section.figure(caption, move || {
         figure::cumulative_periodogram(&figure::Periodogram {
             title: power.clone(),

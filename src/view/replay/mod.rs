@@ -178,8 +178,8 @@ fn figures<'a>(result: &'a ReplayResult, axis: &'a AxisResult, unit: Option<&'a 
         })
     });
     if !curves.cumulative_periodogram.is_empty() {
-        let caption = "Power of the block-averaged innovations up to each frequency: a straight line when the drift \
-                       model is right.";
+        let caption = "Power of the block-averaged innovations up to each frequency, less that of white noise: within \
+                       the band when the drift model is right.";
         section = section.figure(caption, move || {
             figure::cumulative_periodogram(&figure::Periodogram {
                 title: titled("cumulative periodogram"),

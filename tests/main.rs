@@ -10,6 +10,7 @@ mod answers;
 mod architecture;
 mod attitude;
 mod bad_input;
+mod browser;
 mod cli;
 mod code;
 mod compare;

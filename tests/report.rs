@@ -632,7 +632,7 @@ fn a_page_has_every_level_and_a_sheet_the_figures_above_the_page() {
         .figure("", || svg("sigma"));
     let report = Report { sections: vec![section], ..Report::default() };
     let html = html::page(&report).unwrap();
-    assert!(html.contains("<h2>Heading</h2>") && html.contains("the answer") && html.contains("the rest"));
+    assert!(html.contains(">Heading</h2>") && html.contains("the answer") && html.contains("the rest"));
     assert_eq!(html.matches("<svg ").count(), 2);
     let sheet = report.sheet("All");
     assert!(sheet.matches("<svg y=").count() == 1 && !sheet.contains("error budget"), "{sheet}");

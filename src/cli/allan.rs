@@ -9,7 +9,7 @@ use super::files::{self, Kind};
 use super::output::{print_json, print_report};
 use super::plot::Plot;
 use crate::ops::allan::{Done, Request, run as allan};
-use crate::report::Report;
+use crate::report::{Report, Section};
 use crate::view;
 
 /// Allan deviations of a log, with intervals and noise identification
@@ -63,6 +63,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let last = logs.len() - 1;
     for (i, (name, axes)) in logs.iter().enumerate() {
         let mut report = view::allan::allan(name, axes);
+        if last > 0 {
+            // axes of several logs have the same names
+            report.sections.insert(0, Section::new("").paragraph(format!("{name}:")));
+        }
         if !args.overlay && last == 0 {
             args.plot.write(&title, &report)?;
         }

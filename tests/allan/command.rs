@@ -158,7 +158,7 @@ fn several_logs_share_a_panel() {
         bench.read(file).split("<svg y=").skip(1).map(|f| f.matches(" class=\"kf4").count()).collect::<Vec<_>>()
     };
     let text = bench.ok("allan a.csv b.csv --rate 100 --plot two.svg");
-    assert!(text.contains("a.csv: overlapping") && text.contains("b.csv: overlapping"), "{text}");
+    assert!(text.starts_with("a.csv:\n") && text.contains("\nb.csv:\n"), "{text}");
     // a band for each curve, and one in the legend
     assert_eq!(curves("two.svg"), [3, 3]);
     let svg = bench.read("two.svg");
@@ -185,7 +185,7 @@ fn a_log_is_drawn_over_time() {
     bench.file("log.csv", format!("t (s),x (deg/s)\n{}", rows.collect::<String>()));
     bench.ok("info log.csv --plot log.svg");
     let svg = bench.read("log.svg");
-    for word in ["x: log.csv", "mean of 101 samples, 1.010 s", "a: gap at 7.0", "x (deg/s)"] {
+    for word in ["x: log.csv", "mean of 101 samples, 1.010 s", "a: gap at 12.00 s", "x (deg/s)"] {
         assert!(svg.contains(word), "{word}");
     }
     // log and average in two pieces each, and a sample in the legend

@@ -209,7 +209,7 @@ impl Chart {
 
         let mut chart = ChartBuilder::on(root)
             .margin_top(top)
-            .margin_right(150)
+            .margin_right(210)
             .margin_bottom(EDGE / 2)
             .y_label_area_size(left)
             .x_label_area_size(390)

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use super::Status;
 use super::files::{self, Kind};
 use super::output::{print_json, print_report};
+use super::plot::Plot;
 use crate::export::{atomic, junit};
 use crate::ops::closed_loop::{Request, run as judge};
 use crate::view;
@@ -15,6 +16,7 @@ use crate::view;
 /// without simulation: motions, margins at every surface, rms by source, offsets, responses. Exit status 1 when a
 /// criterion of the flight is not kept.
 #[derive(Debug, clap::Args)]
+#[command(mut_arg("plot", |plot| plot.help("Poles, loop gain, sensitivity and surface rates as figures")))]
 #[command(after_help = "Example: kfdesign loop data/flights/aerosonde-loop.json --report loop.html")]
 pub struct Args {
     #[command(flatten)]
@@ -31,9 +33,8 @@ pub struct Args {
     /// Verdict, tables and figures on one page
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
-    /// Poles, loop gain, sensitivity and surface rates as figures
-    #[arg(long, value_name = "FILE.svg")]
-    plot: Option<PathBuf>,
+    #[command(flatten)]
+    plot: Plot,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
@@ -41,16 +42,16 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
         ("-o", &args.output, Kind::Json),
         ("--junit", &args.junit, Kind::Xml),
         ("--report", &args.report, Kind::Html),
-        ("--plot", &args.plot, Kind::Svg),
+        args.plot.output(),
     ];
     files::check(&outputs, &args.request.inputs())?;
-    let done = judge(&args.request, args.report.is_some() || args.plot.is_some())?;
+    let done = judge(&args.request, args.report.is_some() || args.plot.wanted())?;
     files::write_json(args.output.as_deref(), &done.judged.document)?;
     if let Some(path) = &args.junit {
         atomic::write(path, junit::of_loop(&done.judged.document)?.as_bytes())?;
     }
     let mut report = view::closed_loop::closed_loop(&done.judged, &done.corners);
-    files::write_plot(args.plot.as_deref(), &report.title, &report)?;
+    args.plot.write(&report.title, &report)?;
     files::write_page(args.report.as_deref(), &report)?;
     let status = if done.judged.passes() { Status::Done } else { Status::CheckFailed };
     if args.json {

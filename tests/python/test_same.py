@@ -52,6 +52,7 @@ PAIRS: dict[str, Callable[[], kf.Result]] = {
     "replay filter.json log.npy --follow 5min": lambda: kf.replay("filter.json", "log.npy", follow="5min"),
     "montecarlo filter.json --runs 20 --duration 60s": lambda: kf.montecarlo("filter.json", runs=20, duration="60s"),
     f"trim {AIRPLANE} --speed '25 m/s' --altitude '100 m'": lambda: kf.trim(AIRPLANE, speed="25 m/s", altitude="100 m"),
+    "loop data/flights/aerosonde-loop.json": lambda: kf.loop("data/flights/aerosonde-loop.json"),
     f"fly {FLIGHT} -o flight.npy --duration 2s": lambda: kf.fly(FLIGHT, output="flight.npy", duration=2),
 }
 

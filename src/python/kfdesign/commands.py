@@ -22,6 +22,7 @@ from .results import (
     Identified,
     Inflation,
     LogPlan,
+    Loop,
     MonteCarlo,
     Nees,
     Ranking,
@@ -389,6 +390,7 @@ def tune(
     aids: Texts = None,
     motion: str | None = None,
     accelerometer: ParamsLike | None = None,
+    flight: StrPath | None = None,
     objective: str = "nominal",
     hold: Texts = None,
     logs: LogLike | Sequence[LogLike] | None = None,
@@ -409,13 +411,15 @@ def tune(
     params : Identified, Params or path
         The sensor.
     plant : str or mapping
-        What it is part of: static, angle, rate, vertical, attitude, a design file, or what one holds.
+        What it is part of: static, angle, rate, vertical, attitude, airplane, a design file, or what one holds.
     aids : sequence of str
         Measurements beside it: ``["heading: 2 deg @ 1 Hz, 3 deg over 60 s"]``; columns of logs, ``"heading=yaw:deg"``.
     motion : str
         Of the plant rate: ``"20 deg/s over 0.5 s"``.
     accelerometer : Identified, Params or path
         Of the plants vertical and attitude.
+    flight : path
+        Of the plant airplane: flight.json.
     objective : {"nominal", "robust", "likelihood", "nees", "als"}
         What the parameters are chosen by.
     hold : sequence of str
@@ -462,7 +466,10 @@ def tune(
             "flicker_horizon": flicker_horizon,
             "log": [call.log(one) for one in found],
             "choosing": {key: value for key, value in choosing.items() if value is not None},
-            "plant": _plant(call, plant, aids, motion, accelerometer),
+            "plant": {
+                **_plant(call, plant, aids, motion, accelerometer),
+                "flight": None if flight is None else existing(flight),
+            },
             "reading": found[0]._reading if found else {},
         }
         return Design(call.run("tune", request, progress))
@@ -953,6 +960,67 @@ def trim(
     request = {**locals(), "file": existing(file)}
     with Call() as call:
         return Trim(call.run("trim", request))
+
+
+@suggesting
+def loop(
+    flight: StrPath,
+    *,
+    truth: StrPath | None = None,
+    sweep: str | None = None,
+    spread: int | None = None,
+    optimize: bool = False,
+    montecarlo: int | None = None,
+    duration: str | float = "60s",
+    seed: int = 1,
+    progress: Progress = False,
+) -> Loop:
+    """The filter in the control loop: what every feed does to damping, margins, gusts and accuracy.
+
+    Parameters
+    ----------
+    flight : path
+        flight.json with autopilot, feeds and criteria.
+    truth : path
+        Another flight.json, in which the same gains and filters fly.
+    sweep : {"lowpass", "noise", "airspeed", "gust", "gain", "delay"}
+        Also vary one thing.
+    spread : int
+        Also judge so many drawn airplanes and sensors.
+    optimize : bool
+        Also choose corner and gains of each feed.
+    montecarlo : int
+        Also fly every feed so many times.
+    duration : str or float
+        Of a flight; a number is in seconds.
+    seed : int
+        Of all random numbers.
+    progress : bool or function
+        Show how far it is.
+
+    Returns
+    -------
+    Loop
+
+    Examples
+    --------
+    >>> import kfdesign as kf
+    >>> judged = kf.loop("data/flights/aerosonde-loop.json")
+    >>> judged.best
+    'drift KF'
+    """
+    request = {
+        "flight": existing(flight),
+        "truth": None if truth is None else existing(truth),
+        "sweep": sweep,
+        "spread": spread,
+        "optimize": optimize,
+        "montecarlo": montecarlo,
+        "duration": text_of(duration) + ("" if isinstance(duration, str) else "s"),
+        "seed": seed,
+    }
+    with Call() as call:
+        return Loop(call.run("loop", request, progress))
 
 
 @suggesting

@@ -575,6 +575,45 @@ class Flight(_Recorded):
         return f"{self.document['airplane']}, {self.document['duration_s']:g} s"
 
 
+class Loop(Result):
+    """The feeds between sensors and gains, each in the closed loop, and which criteria they keep."""
+
+    _format = "kfdesign-loop"
+
+    @property
+    def best(self) -> str | None:
+        """Of the feeds that keep every criterion, the one with the least surface rate."""
+        found = self.document["best"]
+        return None if found is None else str(found)
+
+    @property
+    def criteria(self) -> Table:
+        """One row per feed, limit and surface or axis."""
+        return Table.of(self.document["criteria"])
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What would be unsafe although a margin looks good."""
+        return tuple(self.document["warnings"])
+
+    def modes(self, feed: str, half: str = "pitch") -> Table:
+        """Motions of the closed loop of a feed, "pitch" or "roll_yaw"; those of filters among them."""
+        names = [one["name"] for one in self.document["feeds"]]
+        if feed not in names:
+            raise KfdesignError(f"there is no feed '{feed}'; there are {', '.join(names)}")
+        found = self.document["feeds"][names.index(feed)][half]["modes"]
+        return Table.of([{**one, "eigenvalue": complex(*one["eigenvalue"])} for one in found])
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        from . import plot
+
+        found = [mode for feed in self.document["feeds"] for mode in feed["pitch"]["modes"]]
+        return plot.poles([complex(*mode["eigenvalue"]) for mode in found], ax)
+
+    def _about(self) -> str:
+        return f"{self.document['airplane']}, {len(self.document['feeds'])} feeds"
+
+
 class Trim(Result):
     """Steady flight, and the linear models about it."""
 

@@ -11,7 +11,8 @@ use kfdesign::filter::FilterDesign;
 use kfdesign::import::Imported;
 use kfdesign::ops::montecarlo::{self, Judged, merge};
 use kfdesign::ops::{
-    allan, closed_loop, compare, datasheet, export, fly, identify, import, inflate, info, plan, replay, simulate, trim, tune,
+    allan, closed_loop, compare, datasheet, export, fly, identify, import, inflate, info, plan, replay, simulate, trim,
+    tune,
 };
 use kfdesign::params::Params;
 use kfdesign::report::{Report, html, terminal};

@@ -76,12 +76,12 @@ fn close(a: &Value, b: &Value, at: &str) {
 fn the_gate_judges_it() {
     let bench = Bench::new();
     tuned(&bench);
-    let printed = bench.ok("montecarlo filter.json --runs 60 --duration 600s --seed 3 --json");
+    let printed = bench.ok("montecarlo filter.json --runs 16 --duration 600s --seed 3 --json");
     let outcome: Value = serde_json::from_str(&printed).unwrap();
     assert_eq!(outcome["verdict"], "consistent", "{printed}");
 }
 
-/// Ten minutes of a nonlinear flight in its turbulence through the filter: the command, the other gyro and the attitude are
+/// Two minutes of a nonlinear flight in its turbulence through the filter: the command, the other gyro and the attitude are
 /// columns of the log.
 #[test]
 fn it_is_replayed_on_a_flight() {
@@ -292,11 +292,11 @@ fn mistakes() {
         assert_eq!(out.stderr.lines().count(), 1, "{args}: {}", out.stderr);
         assert!(out.stderr.contains(part), "{args}: {}", out.stderr);
     };
-    refused("tune params.json --plant airplane", "say which airplane flies how, `flight` FLIGHT.json");
-    refused("tune params.json --flight flight.json", "`flight` belongs to `plant` airplane");
+    refused("tune params.json --plant airplane", "say which airplane flies how, --flight FLIGHT.json");
+    refused("tune params.json --flight flight.json", "--flight belongs to --plant airplane");
     refused(
         "tune params.json --plant airplane --flight flight.json --insight",
-        "`insight` is no matter of `plant` airplane",
+        "--insight is no matter of --plant airplane",
     );
     let mut slow = gyro(1.0);
     slow["sample_rate"] = json!("50 Hz");

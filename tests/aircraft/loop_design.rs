@@ -118,8 +118,7 @@ fn a_rule_gives_gains() {
     // with the rule's own gains the exact loop has the damping asked for
     let mut exact = document.clone();
     exact["autopilot"].as_object_mut().unwrap().remove("rule");
-    exact["autopilot"]["gains"] =
-        json!({ "kq": format!("{} s", gain("kq")), "ktheta": 0, "kp": "0 s", "kphi": 0, "kr": "0 s" });
+    exact["autopilot"]["gains"] = json!({ "kq": format!("{} s", gain("kq")), "ktheta": 0, "kp": format!("{} s", gain("kp")), "kphi": gain("kphi"), "kr": format!("{} s", gain("kr")) });
     exact["sensors"] = json!({});
     let modes = &judged(&exact).document.feeds[0].pitch.modes;
     let damping = modes.iter().find(|mode| mode.eigenvalue[1] > 1.5).unwrap().damping;

@@ -68,7 +68,8 @@ pub enum FeedEntry {
         #[serde(skip_serializing_if = "Option::is_none")]
         airspeed: Option<Measured>,
         /// Several airspeeds: a filter for each, with what lies between interpolated by the airspeed that it flies at.
-        #[serde(skip_serializing_if = "Vec::is_empty")]
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        #[schemars(length(min = 2))]
         schedule: Vec<Measured>,
         /// filter.json of `tune` with the plant airplane; made of the flight when absent.
         #[serde(skip_serializing_if = "Option::is_none")]

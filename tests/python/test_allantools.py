@@ -21,6 +21,9 @@ def test_four_tuple(kind: str, data_type: str, grid: int) -> None:
     data = random.normal(size=700) + np.cumsum(random.normal(size=700)) * 0.1
     mine = getattr(ours, kind)(data, rate=50.0, data_type=data_type, taus=GRIDS[grid])
     other = getattr(theirs, kind)(data, rate=50.0, data_type=data_type, taus=GRIDS[grid])
+    if kind == "totdev":
+        # theirs goes on beyond half of the record
+        other = tuple(column[: len(mine[0])] for column in other)
     np.testing.assert_array_equal(mine[3], other[3])
     np.testing.assert_allclose(mine[0], other[0], rtol=1e-15)
     # the same sums in another order: a few hundred roundings of 1e-16

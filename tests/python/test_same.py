@@ -45,11 +45,18 @@ PAIRS: dict[str, Callable[[], kf.Result]] = {
         "params.json", plant="angle", aids=["heading: 2 deg @ 1 Hz"], runs=20, insight=True
     ),
     "tune --rank filter.json params.json log.npy": lambda: kf.rank(["filter.json", "params.json"], "log.npy"),
-    "replay filter.json log.npy --alpha 0.02": lambda: kf.replay("filter.json", "log.npy", alpha=0.02),
+    "replay filter.json log.npy --alpha 0.02": lambda: kf.replay(
+        "filter.json", "log.npy", alpha=0.02, estimates=False
+    ),
+    "replay filter.json log.npy --alpha 0.02 -o estimates.npy": lambda: kf.replay(
+        "filter.json", "log.npy", alpha=0.02
+    ),
     "replay filter.json log.npy -o smoothed.npy --smooth --end 900": lambda: kf.replay(
         "filter.json", kf.read_log("log.npy", end=900), smooth=True
     ),
-    "replay filter.json log.npy --follow 5min": lambda: kf.replay("filter.json", "log.npy", follow="5min"),
+    "replay filter.json log.npy --follow 5min -o estimates.npy": lambda: kf.replay(
+        "filter.json", "log.npy", follow="5min"
+    ),
     "montecarlo filter.json --runs 20 --duration 60s": lambda: kf.montecarlo("filter.json", runs=20, duration="60s"),
     f"trim {AIRPLANE} --speed '25 m/s' --altitude '100 m'": lambda: kf.trim(AIRPLANE, speed="25 m/s", altitude="100 m"),
     "loop data/flights/aerosonde-loop.json": lambda: kf.loop("data/flights/aerosonde-loop.json"),

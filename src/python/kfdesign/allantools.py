@@ -1,7 +1,8 @@
 """The deviations of allantools with its signatures: ``from kfdesign import allantools``.
 
 Each gives ``(taus, deviations, errors, counts)``; the error is deviation / √count, as there. :func:`kfdesign.allan`
-gives intervals that know the noise.
+gives intervals that know the noise. `totdev` ends at half of the record, as its definition does (Greenhall, Howe and
+Percival 1999); allantools goes on, where all that is averaged is reflected.
 """
 
 from __future__ import annotations

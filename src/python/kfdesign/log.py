@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -308,7 +307,8 @@ class Log:
         given: dict[str, Floats] = {}
         for own, values in found:
             array = np.asarray(values)
-            if array.dtype.kind == "M":
+            # times of a zone are objects to NumPy
+            if array.dtype.kind == "M" or getattr(getattr(values, "dtype", None), "tz", None) is not None:
                 given[own if own != _INDEX else "time (s)"] = _stamps(values, name, notes)
             elif array.dtype.kind in "iuf":
                 given[own] = _numbers(array, f"{name}: column '{own}'", notes)
@@ -426,10 +426,10 @@ def _numbers(x: npt.ArrayLike, name: str, notes: list[str]) -> Floats:
         raise LogError(f"{name}: {array.dtype} is time; give it as `time`, and the samples as numbers")
     if kind not in "iuf":
         raise LogError(f"{name}: values of the kind '{array.dtype}'; expected numbers")
-    if array.dtype != np.float64:
-        notes.append(f"{array.dtype.name} was converted to float64")
-    elif not array.dtype.isnative:
+    if not array.dtype.isnative:
         notes.append("the other byte order was converted")
+    elif array.dtype != np.float64:
+        notes.append(f"{array.dtype.name} was converted to float64")
     return np.require(array, np.float64, "A")
 
 
@@ -437,7 +437,7 @@ def _stamps(time: Any, name: str, notes: list[str]) -> Floats:
     """Seconds; of datetimes from the first one on."""
     if getattr(getattr(time, "dtype", None), "tz", None) is not None:
         notes.append(f"times of the zone {time.dtype.tz} are taken as UTC")
-        time = time.tz_convert("UTC").tz_localize(None) if hasattr(time, "tz_convert") else time.dt.tz_convert(None)
+        time = time.dt.tz_convert(None) if hasattr(time, "dt") else time.tz_convert(None)
     array = np.asarray(time)
     if array.dtype.kind == "M":
         if not len(array):
@@ -466,10 +466,14 @@ def _columns(frame: Any, name: str) -> list[tuple[str, Any]]:
     if isinstance(frame, Mapping):
         return [(str(own), values) for own, values in frame.items()]
     if hasattr(frame, "__arrow_c_stream__"):
-        for module in ("polars", "pyarrow"):
-            if module in sys.modules or _can_import(module):
-                made = __import__(module)
-                return _columns(made.from_arrow(frame) if module == "polars" else made.table(frame), name)
+        if _can_import("polars"):
+            import polars
+
+            return _columns(polars.DataFrame(frame), name)
+        if _can_import("pyarrow"):
+            import pyarrow
+
+            return _columns(pyarrow.table(frame), name)
         raise LogError(f"{name}: an Arrow stream needs polars or pyarrow to be read")
     raise LogError(f"{name}: expected a table of pandas, polars or pyarrow, found {type(frame).__name__}")
 

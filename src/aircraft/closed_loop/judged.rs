@@ -121,7 +121,7 @@ impl Judged {
             );
         }
         let notes = warnings::notes(&results, &raw);
-        let judgements = verdict::judge(&results, &criteria);
+        let judgements = verdict::judge(&results.iter().collect::<Vec<_>>(), &criteria);
         let linear = Linearized::new(&truth.airplane, truth.trim)?.document(&truth.airplane, &truth.request, None)?;
         let document = document((&truth, &setting.control), &linear, &results, judgements, (warned, notes));
         Ok(Judged { setting, truth, feeds, criteria, results, raw, document })

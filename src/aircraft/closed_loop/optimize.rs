@@ -117,7 +117,7 @@ impl Search<'_> {
             return None;
         }
         let others = self.judged.results.iter().filter(|other| other.name != result.name);
-        let all: Vec<FeedResult> = others.cloned().chain([result.clone()]).collect();
+        let all: Vec<&FeedResult> = others.chain([&result]).collect();
         let judged = judge(&all, &self.judged.criteria);
         let own: Vec<Judgement> = judged.into_iter().filter(|judgement| judgement.feed == result.name).collect();
         let mut misses: Vec<f64> = own.iter().map(missed).collect();
@@ -156,8 +156,9 @@ impl Search<'_> {
             constraints: count,
             f_abs: 1e-5,
             worth: 1e-4,
-            evaluations: 60,
-            rounds: 3,
+            // it only has to come near: the steps below go to the end
+            evaluations: 30,
+            rounds: 1,
             ..Problem::default()
         };
         let found = minimize(&problem, &start, &self.bounds());

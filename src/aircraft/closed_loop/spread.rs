@@ -48,7 +48,7 @@ pub fn spread(judged: &Judged, uncertainty: &UncertaintyEntry, cases: u64, seed:
         let truth = draw(&judged.truth, uncertainty, seed, case)?;
         let judge = || -> Result<Case, LoopError> {
             let results = analyse(&judged.setting, &truth, &judged.feeds)?;
-            let judgements = judge(&results, &judged.criteria);
+            let judgements = judge(&results.iter().collect::<Vec<_>>(), &judged.criteria);
             let each = results.iter().map(|result| {
                 let keeps = judgements.iter().all(|judgement| judgement.feed != result.name || judgement.pass);
                 [result.unstable().is_none(), keeps && result.unstable().is_none()]

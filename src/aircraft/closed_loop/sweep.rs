@@ -155,7 +155,7 @@ pub fn sweep(judged: &Judged, entries: &[FeedEntry], folder: &Path, variable: Va
     let point = |value: &f64| match at(judged, entries, folder, variable, *value) {
         Err(error) => Point { value: *value, none: Some(error.0), feeds: Vec::new(), best: None },
         Ok(results) => {
-            let feeds = feed_points(&results, &judge(&results, &judged.criteria));
+            let feeds = feed_points(&results, &judge(&results.iter().collect::<Vec<_>>(), &judged.criteria));
             Point { value: *value, none: None, best: best(&feeds).map(|feed| feed.name.clone()), feeds }
         }
     };

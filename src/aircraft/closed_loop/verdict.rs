@@ -112,11 +112,11 @@ fn unstable(half: Half, criterion: &Criterion) -> Vec<&'static str> {
 }
 
 /// All limits of all feeds, criterion by criterion.
-pub fn judge(results: &[FeedResult], criteria: &CriteriaEntry) -> Vec<Judgement> {
+pub fn judge(results: &[&FeedResult], criteria: &CriteriaEntry) -> Vec<Judgement> {
     criteria.0.iter().flat_map(|limit| results.iter().flat_map(|result| of_feed(results, result, limit))).collect()
 }
 
-fn of_feed(results: &[FeedResult], result: &FeedResult, limit: &LimitEntry) -> Vec<Judgement> {
+fn of_feed(results: &[&FeedResult], result: &FeedResult, limit: &LimitEntry) -> Vec<Judgement> {
     let criterion = limit.criterion;
     let unit = criterion.unit;
     let found = values(result, &criterion);

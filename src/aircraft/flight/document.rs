@@ -10,6 +10,7 @@ mod read;
 mod rule;
 mod uncertainty;
 mod values;
+mod weights;
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Serialize;
 
-use super::read::{lateral, longitudinal};
 use super::values::{ANGLE, VELOCITY, linked as link, required, value, word};
+use super::weights::{lateral, longitudinal};
 use super::{LateralWeights, Linked, LongitudinalWeights, linked};
 use crate::params::place::{KeyError, Object, Place};
 use crate::params::{Measured, ParamsDocument, Range};

@@ -7,12 +7,12 @@ use serde_json::Value;
 use super::values::{ANGLE, LENGTH, RATE, VELOCITY, linked, required, value, word};
 use super::{
     AutopilotEntry, ControlsEntry, DriftEntry, EarthEntry, ErrorEntry, FORMAT, FlightDocument, GainsEntry, GnssEntry,
-    GustEntry, InitialEntry, LateralWeights, LongitudinalWeights, LqrEntry, PlaceEntry, SensorsEntry, TrimEntry,
-    WindEntry, criteria, feeds, optimize, rule, uncertainty,
+    GustEntry, InitialEntry, PlaceEntry, SensorsEntry, TrimEntry, WindEntry, criteria, feeds, optimize, rule,
+    uncertainty, weights,
 };
 use crate::aircraft::atmosphere::discrete::Form;
 use crate::aircraft::atmosphere::dryden::Specification;
-use crate::params::place::{KeyError, Object, Place};
+use crate::params::place::{KeyError, Place};
 use crate::params::{Measured, Range};
 use crate::units::Dimension;
 
@@ -263,7 +263,7 @@ fn autopilot(place: &Place<'_>) -> Result<AutopilotEntry, KeyError> {
         rate: required(&o, "rate", Dimension::FREQUENCY)?,
         delay: o.optional("delay").map(|p| samples(&p)).transpose()?.unwrap_or(1),
         gains: of_gains.map(|p| gains(&p)).transpose()?,
-        lqr: of_lqr.map(|p| lqr(&p)).transpose()?,
+        lqr: of_lqr.map(|p| weights::lqr(&p)).transpose()?,
         rule: of_rule.map(|p| rule::rule(&p)).transpose()?,
         attitude_filter: value(&o, "attitude_filter", Dimension::TIME, Range::Positive)?,
         pitch: value(&o, "pitch", ANGLE, Range::Any)?,
@@ -280,43 +280,6 @@ fn samples(place: &Place<'_>) -> Result<u64, KeyError> {
     count.filter(|_| unit && words.next().is_none()).ok_or_else(|| {
         place.error(format!("expected a whole number of samples, for example \"1 sample\", found \"{text}\""))
     })
-}
-
-fn lqr(place: &Place<'_>) -> Result<LqrEntry, KeyError> {
-    let o = place.object(&["longitudinal", "lateral"])?;
-    Ok(LqrEntry {
-        longitudinal: longitudinal(&o.required("longitudinal")?)?,
-        lateral: lateral(&o.required("lateral")?)?,
-    })
-}
-
-pub(super) fn longitudinal(place: &Place<'_>) -> Result<LongitudinalWeights, KeyError> {
-    let o = place.object(&["states", "elevator"])?;
-    Ok(LongitudinalWeights { states: state_weights(&o, "u, w, q, theta")?, elevator: input_weight(&o, "elevator")? })
-}
-
-pub(super) fn lateral(place: &Place<'_>) -> Result<LateralWeights, KeyError> {
-    let o = place.object(&["states", "aileron", "rudder"])?;
-    Ok(LateralWeights {
-        states: state_weights(&o, "v, p, r, phi")?,
-        aileron: input_weight(&o, "aileron")?,
-        rudder: input_weight(&o, "rudder")?,
-    })
-}
-
-fn state_weights(object: &Object<'_>, names: &str) -> Result<[f64; 4], KeyError> {
-    let place = object.required("states")?;
-    let values = place.list()?.iter().map(Place::plain).collect::<Result<Vec<f64>, _>>()?;
-    <[f64; 4]>::try_from(values.as_slice())
-        .ok()
-        .filter(|values| values.iter().all(|x| *x >= 0.0))
-        .ok_or_else(|| place.error(format!("expected the weights of {names}: four numbers of zero or more")))
-}
-
-fn input_weight(object: &Object<'_>, key: &str) -> Result<f64, KeyError> {
-    let place = object.required(key)?;
-    let value = place.plain()?;
-    if value > 0.0 { Ok(value) } else { Err(place.error(format!("found {value}, expected more than zero"))) }
 }
 
 fn gains(place: &Place<'_>) -> Result<GainsEntry, KeyError> {

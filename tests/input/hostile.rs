@@ -252,7 +252,7 @@ fn files_made_on_purpose_take_no_more_than_others() {
     let wide: Vec<(u8, &[u8])> = [wide, &vec![(b'D', &[0, 0][..]); 100_000]].concat();
     let names = vec![b'a'; 1 << 20];
     let window = [&[0; 16][..], &(1u64 << 40).to_le_bytes(), &[0; 4], b"\x04\0\0\0zstd", &[0; 8]].concat();
-    let files: [(&str, Vec<u8>, &str); 18] = [
+    let files: [(&str, Vec<u8>, &str); 19] = [
         ("repeated.npy", npy("(0,)", &format!("[{fields}]")), ROOM),
         ("long.ulg", ulog(&[(b'F', &long), (b'A', b"\0\0\0q"), (b'D', b"\0\0\x01")]), "a name of 2003 bytes"),
         ("wide.ulg", ulog(&wide), WORK),
@@ -291,6 +291,7 @@ fn files_made_on_purpose_take_no_more_than_others() {
         ("children.parquet", many(1 << 30), "declares more than there is"),
         ("window.mcap", mcap(&[(6, window)]), WORK),
         ("row.db3", row_of_values(8 << 20), "1 rows or pages of the database cannot be read"),
+        ("lines.csv.gz", packed(&"0.5\n0.505\n\n..\n".repeat(600_000)), ""),
         ("columns.csv.gz", packed(&[&"0.5\t".repeat(16_580)[..], "0.5\n"].concat().repeat(2)), ROOM),
         ("columns.csv", [&"1,".repeat(100_000)[..], "1\n"].concat().repeat(3).into_bytes(), ROOM),
     ];

@@ -93,26 +93,32 @@ impl Ahead {
             let chunks = (EACH * rayon::current_num_threads()).clamp(EACH, MOST);
             let hands = Mutex::new(Hands { pages: std::mem::take(&mut self.pages), done: Vec::new() });
             let (rows, most) = (AtomicU64::new(0), self.most);
-            let row = 8 * (2 + form.columns_of_values() as u64);
+            // a column grows by doubling
+            let row = 2 * 8 * (2 + form.columns_of_values() as u64);
             let hands_now = || hands.lock().unwrap_or_else(PoisonError::into_inner);
             // who has the file reads a chunk, and parses it while others read and parse theirs
             let file = Mutex::new((&mut *self, reader, 0));
             (0..chunks).into_par_iter().with_max_len(1).for_each(|_| {
-                if rows.load(Ordering::Relaxed) * row > most {
-                    return;
-                }
                 let mut page = hands_now().pages.pop().unwrap_or_default();
                 let chunk = {
                     let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
                     let (ahead, reader, number) = &mut *file;
-                    *number += 1;
-                    let mut chunk = ahead.spare.pop().unwrap_or_default();
-                    chunk.number = *number;
-                    ahead.fill(&mut page, &mut chunk, *reader, step).then_some(chunk)
+                    let mut chunk = None;
+                    if rows.load(Ordering::Relaxed) * row <= most {
+                        *number += 1;
+                        let mut next = ahead.spare.pop().unwrap_or_default();
+                        next.number = *number;
+                        if ahead.fill(&mut page, &mut next, *reader, step) {
+                            // lines count when they are read: others read while these are parsed
+                            let lines = page.text[LEAD..page.end].iter().filter(|b| **b == b'\n').count();
+                            rows.fetch_add(lines as u64, Ordering::Relaxed);
+                            chunk = Some(next);
+                        }
+                    }
+                    chunk
                 };
                 let chunk = chunk.map(|mut chunk| {
                     page.parse(form, &mut chunk);
-                    rows.fetch_add(chunk.rows.lines.len() as u64, Ordering::Relaxed);
                     chunk
                 });
                 let mut hands = hands_now();

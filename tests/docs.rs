@@ -227,6 +227,7 @@ true_pages! {
     noise_models: "docs/noise-models.md",
     plants: "docs/plants.md",
     quickstart: "docs/quickstart.md",
+    seed_paper: "docs/seed-paper.md",
     tour: "docs/tour.md",
     tuning: "docs/tuning.md",
     ulog_to_ekf2: "docs/ulog-to-ekf2.md",

@@ -56,6 +56,9 @@ pub fn bias_instability(minimum: f64) -> f64 {
 #[derive(Clone, Debug, Default)]
 struct Reading {
     density: Option<f64>,
+    /// Standard deviation of the samples.
+    spread: f64,
+    /// Of their moving average.
     std_dev: Option<f64>,
     minimum: Option<AllanPoint>,
     /// Maximum after the minimum, not the end of the curve.
@@ -145,6 +148,7 @@ fn read(curve: &AllanCurve, rate: &[f64]) -> Reading {
     let minimum = lowest(before).map(|i| before[i]).filter(|m| points.last().is_some_and(|last| m.m != last.m));
     Reading {
         density: white_line(before),
+        spread: Moments::of(rate).variance().sqrt(),
         std_dev: smoothed_std_dev(rate, WINDOW),
         minimum: minimum.cloned(),
         peak: peak.map(|j| points[j].clone()),
@@ -228,6 +232,20 @@ fn steps(reading: &Reading, curve: &AllanCurve, model: &NoiseModel, dt: f64, dis
         unit: rate.to_string(),
         cost: "too large for a band-limited sensor, whose samples scatter less than this".into(),
     };
+    let whole = Step {
+        what: "std, of the log".into(),
+        formula: "standard deviation of the samples".into(),
+        value: Some(rate.from_si(reading.spread)),
+        unit: rate.to_string(),
+        cost: match density.map(|n| reading.spread / sample_std_dev(n, dt)) {
+            Some(ratio) if ratio < 1.0 => format!(
+                "{} of sigma_g, and white noise cannot be less than all of it: N is read too high, or a low-pass \
+                 makes samples alike",
+                digits(ratio)
+            ),
+            _ => "a check of sigma_g, which cannot be larger: the drift adds its square".into(),
+        },
+    };
     let residual = density.map(|n| n / (WINDOW as f64 * dt).sqrt());
     let sigma_gm = Step {
         what: "sigma_GM, standard deviation of the drift".into(),
@@ -279,7 +297,7 @@ fn steps(reading: &Reading, curve: &AllanCurve, model: &NoiseModel, dt: f64, dis
                that model and is not written to the parameters"
             .into(),
     };
-    vec![white, sigma_g, sigma_gm, tc, b]
+    vec![white, sigma_g, whole, sigma_gm, tc, b]
 }
 
 fn peak_cost(reading: &Reading, curve: &AllanCurve, model: &NoiseModel, rate: &Unit) -> String {

@@ -133,10 +133,8 @@ pub(crate) fn make(name: &str, request: &str) -> anyhow::Result<Made> {
     Ok(match name {
         "params" => document(Params::read(&asked::<PathBuf>(request)?)?.to_json()),
         "design" => document(FilterDesign::read(&asked::<PathBuf>(request)?)?.to_json()),
-        "info" => {
-            let name = asked::<info::Request>(request)?.log.display().to_string();
-            row!(info::run(&asked(request)?)?; d => d; view::info::info(&name, d, true); None)
-        }
+        "info" => { let name = asked::<info::Request>(request)?.log.display().to_string();
+            row!(info::run(&asked(request)?)?; d => d; view::info::info(&name, d, true); None) }
         "allan" => row!(allan::run(&asked(request)?)?; d => d.document; view::allan::allan(&d.name, &d.axes);
             Some(format!("{}: {}", d.name, d.document.deviation.name()))),
         "identify" => row!(identify::run(&asked(request)?)?; d => d.document();
@@ -149,12 +147,10 @@ pub(crate) fn make(name: &str, request: &str) -> anyhow::Result<Made> {
             d.params.to_json()),
         "simulate" => row!(simulate::run(&asked(request)?)?; d => d; view::simulate::simulate(d); None),
         "trim" => row!(trim::run(&asked(request)?)?; d => d.document; view::trim::trim(&d.linearized, &d.document); None),
-        "fly" => row!(fly::run(&asked(request)?, true)?; d => d.report;
-            view::fly::fly(&d.report, &d.header, d.lines.as_ref(), &d.stops);
-            Some(format!("Flight of {}", d.report.airplane))),
-        "loop" => row!(closed_loop::run(&asked(request)?, true)?; d => d.judged.document;
-            view::closed_loop::closed_loop(&d.judged, &d.corners);
-            Some(format!("Control loop of {}", d.judged.document.airplane))),
+        "fly" => row!(fly::run(&asked(request)?, true)?; d => d.report; view::fly::fly(&d.report, &d.header,
+            d.lines.as_ref(), &d.stops); Some(format!("Flight of {}", d.report.airplane))),
+        "loop" => row!(closed_loop::run(&asked(request)?, true)?; d => d.judged.document; view::closed_loop::closed_loop(
+            &d.judged, &d.corners); Some(format!("Control loop of {}", d.judged.document.airplane))),
         "tune" => match tune::run(&asked(request)?)? {
             tune::Done::Linear(done) => row!(done; d => d.document()?; view::tune::tune(&d.shown());
                 Some("Tuned filter".into()); d.tuned.design.to_json()),

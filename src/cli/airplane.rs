@@ -7,12 +7,15 @@ use super::plot::Plot;
 use crate::ops::airplane::{Request, run as airplane};
 use crate::view;
 
+/// What `--plot` shows.
+const FIGURES: &str = "Figures of angle of attack and elevator, drag and thrust, power over the speeds of level flight";
+
 /// What an airplane document says, and whether it makes sense
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example: kfdesign airplane data/airplanes/aerosonde.json --altitude \"100 m\" --plot speeds.svg"
 )]
-#[command(mut_arg("plot", |plot| plot.help("Figures of angle of attack and elevator, drag and thrust, power over the speeds of level flight")))]
+#[command(mut_arg("plot", |plot| plot.help(FIGURES)))]
 pub struct Args {
     #[command(flatten)]
     request: Request,

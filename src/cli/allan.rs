@@ -12,9 +12,12 @@ use crate::ops::allan::{Done, Request, run as allan};
 use crate::report::{Report, Section};
 use crate::view;
 
+/// What `--plot` shows.
+const FIGURES: &str = "Figure with interval band, fitted components, and N, B, K where they are read";
+
 /// Allan deviations of a log, with intervals and noise identification
 #[derive(Debug, clap::Args)]
-#[command(mut_arg("plot", |plot| plot.help("Figure with interval band, fitted components, and N, B, K where they are read")))]
+#[command(mut_arg("plot", |plot| plot.help(FIGURES)))]
 pub struct Args {
     #[command(flatten)]
     request: Request,

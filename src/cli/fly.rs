@@ -7,6 +7,10 @@ use super::plot::Plot;
 use crate::ops::fly::{Request, run as fly};
 use crate::view;
 
+/// What `--plot` shows.
+const FIGURES: &str = "Figures of the first run: attitude, rates, surfaces with their stops, gusts, way over the \
+    ground, height";
+
 /// An airplane over time: truth and what its sensors show
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: kfdesign fly data/flights/aerosonde.json -o flight.csv --duration 60s\n\
@@ -14,7 +18,7 @@ use crate::view;
     (relative to the earth); elevator, aileron, \
     rudder, throttle; gusts; what the sensors measure (gyro_x … is relative to inertial space); truth of gyro and \
     accelerometer; surface rates.")]
-#[command(mut_arg("plot", |plot| plot.help("Figures of the first run: attitude, rates, surfaces with their stops, gusts, way over the ground, height")))]
+#[command(mut_arg("plot", |plot| plot.help(FIGURES)))]
 pub struct Args {
     #[command(flatten)]
     request: Request,

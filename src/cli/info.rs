@@ -8,13 +8,16 @@ use crate::ops::info::{Request, course, run as info};
 use crate::ops::reading::Reading;
 use crate::view;
 
+/// What `--plot` shows.
+const FIGURES: &str = "Every axis over time, with its moving average and what the log check found";
+
 /// What is in a log: its topics, columns, units, rates and spans
 ///
 /// Nothing is chosen and nothing judged; the commands that take a log do that, and choose a topic with --topic. So does
 /// --plot, for which alone the options of reading count.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: kfdesign info flight.ulg")]
-#[command(mut_arg("plot", |plot| plot.help("Every axis over time, with its moving average and what the log check found")))]
+#[command(mut_arg("plot", |plot| plot.help(FIGURES)))]
 pub struct Args {
     #[command(flatten)]
     request: Request,

@@ -59,6 +59,8 @@ struct Coordinates {
 
 /// Chains of so many states are followed as they are.
 const SMALL: usize = 6;
+/// Part of its largest sigma from which on an error is rounding.
+const KNOWN: f64 = 1e-12;
 /// What an epoch tells the next one less than this about (correlation of whitened errors) is not followed.
 const NEGLIGIBLE: f64 = 1e-4;
 
@@ -74,8 +76,10 @@ fn coordinates(axis: &AxisCourse) -> Vec<Coordinates> {
             || Coordinates { to: DMatrix::from_diagonal(&scale.map(f64::recip)), from: DMatrix::from_diagonal(&scale) };
         return epochs.iter().map(|_| one()).collect();
     }
-    // e = L y with y white
-    let whitened: Vec<Coordinates> = epochs.iter().map(|epoch| whiten(&epoch.covariance)).collect();
+    // e = L y with y white; a state whose error has died out (of a servo that only a known command drives) is known
+    let largest = |i| epochs.iter().map(|e| e.covariance[(i, i)]).fold(0.0, f64::max);
+    let known = DVector::from_fn(n, |i, _| KNOWN * KNOWN * largest(i));
+    let whitened: Vec<Coordinates> = epochs.iter().map(|epoch| whiten(&epoch.covariance, &known)).collect();
     // Uᵀ and Vᵀ of the transition to each epoch that matter
     let kept: Vec<[DMatrix<f64>; 2]> = (0..epochs.len())
         .map(|k| {
@@ -113,11 +117,19 @@ fn coordinates(axis: &AxisCourse) -> Vec<Coordinates> {
         .collect()
 }
 
-/// y = L⁺ e, e = L y with L Lᵀ = `covariance`.
-fn whiten(covariance: &DMatrix<f64>) -> Coordinates {
+/// y = L⁺ e, e = L y with L Lᵀ = `covariance`; a variance up to `known` is none.
+fn whiten(covariance: &DMatrix<f64>, known: &DVector<f64>) -> Coordinates {
     let n = covariance.nrows();
-    let sigma = covariance.diagonal().map(|v| if v > 0.0 { v.sqrt() } else { 1.0 });
-    let correlation = DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] / (sigma[i] * sigma[j]));
+    let open = |i: usize| covariance[(i, i)] > known[i];
+    let sigma = DVector::from_fn(n, |i, _| if open(i) { covariance[(i, i)].sqrt() } else { 1.0 });
+    let correlation =
+        DMatrix::from_fn(
+            n,
+            n,
+            |i, j| {
+                if open(i) && open(j) { covariance[(i, j)] / (sigma[i] * sigma[j]) } else { 0.0 }
+            },
+        );
     let eigen = SymmetricEigen::new(correlation);
     let root = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
     let inverse = root.map(|r| if r > 1e-8 { 1.0 / r } else { 0.0 });

@@ -15,7 +15,7 @@ use crate::support::Bench;
 fn tuned(bench: &Bench) -> FilterDesign {
     bench.file("params.json", gyro(1.0).to_string());
     bench.file("flight.json", flight(MODERATE, "15 kt", json!([{ "type": "raw" }])).to_string());
-    bench.ok("tune params.json --plant airplane --flight flight.json --runs 40 -o filter.json");
+    bench.ok("tune params.json --plant airplane --flight flight.json --runs 2 -o filter.json");
     FilterDesign::read(&bench.path("filter.json")).unwrap()
 }
 

@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 use super::names::Head;
 use super::number::since;
 use super::{BLOCK, InputError, Rows, Table};
-use crate::numerics::progress::Samples;
+use crate::numerics::progress::{Samples, checkpoint};
 
 /// Rows that are asked for at a time, since each question may be a message to another thread.
 const AHEAD: u64 = 16 * BLOCK as u64;
@@ -131,6 +131,7 @@ pub(super) fn sha256(samples: &dyn Samples) -> String {
     let (mut hash, mut block) = (Sha256::new(), Vec::new());
     for column in 0..samples.columns() {
         for start in (0..samples.rows()).step_by(AHEAD as usize) {
+            checkpoint();
             block.clear();
             samples.read(column, start..samples.rows().min(start + AHEAD), &mut block);
             block.iter().for_each(|x| hash.update(x.to_le_bytes()));

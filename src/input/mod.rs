@@ -523,6 +523,7 @@ pub fn sha256(path: &Path) -> Result<String, InputError> {
     let mut hash = Sha256::new();
     let mut buffer = vec![0u8; 1 << 16];
     loop {
+        checkpoint();
         match file.read(&mut buffer).map_err(fail)? {
             0 => return Ok(hex(&hash.finalize())),
             n => hash.update(&buffer[..n]),

@@ -19,7 +19,7 @@ import kfdesign as kf
 
 #: Work of seconds; each is stopped after a third of one.
 LONG: dict[str, str] = {
-    "allan": "kf.allan(log, deviation='totdev', taus='all')",
+    "allan": "kf.allan(log, taus='log:100')",
     "identify": "kf.identify(log)",
     "tune": "kf.tune('params.json', runs=10**6)",
     "replay": "kf.replay('filter.json', log)",
@@ -29,7 +29,9 @@ LONG: dict[str, str] = {
 
 STOPPED = """
 import signal, sys, threading, time
+import warnings
 import numpy as np, kfdesign as kf
+warnings.simplefilter("ignore", kf.LogWarning)
 log = kf.Log.from_array(np.random.default_rng(1).normal(size=(8_000_000, 3)), rate=20, unit="rad/s",
                         names=["gyro_x", "gyro_y", "gyro_z"])
 sent = []

@@ -158,7 +158,11 @@ def test_params_of_others(files: Path, tmp_path: Path) -> None:
         (lambda f: kf.allan(f / "log.npy", taus="often"), kf.KfdesignError, "`taus` often: expected octave"),
         (lambda f: kf.replay(f / "filter.json", f / "log.npy", aid={"heading": "yaw"}), kf.KfdesignError, "heading"),
         (lambda f: kf.read_params(f / "params.json").save(f / "no/such.json"), kf.KfdesignError, "no/such.json"),
-        (lambda f: kf.plan(f / "params.json", parameter="white.density", precision=0.1).report("/proc/x.html"), kf.KfdesignError, "/proc/x.html"),
+        (
+            lambda f: kf.plan(f / "params.json", parameter="white.density", precision=0.1).report("/proc/x.html"),
+            kf.KfdesignError,
+            "/proc/x.html",
+        ),
         (lambda f: kf.export(f / "params.json", to="nobody"), kf.KfdesignError, "unknown variant `nobody`"),
         (lambda f: kf.set_threads(0), kf.KfdesignError, "expected 1 to 1024"),
         (lambda f: kf.identify([]), kf.LogError, "there is no log"),

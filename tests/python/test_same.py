@@ -45,12 +45,8 @@ PAIRS: dict[str, Callable[[], kf.Result]] = {
         "params.json", plant="angle", aids=["heading: 2 deg @ 1 Hz"], runs=20, insight=True
     ),
     "tune --rank filter.json params.json log.npy": lambda: kf.rank(["filter.json", "params.json"], "log.npy"),
-    "replay filter.json log.npy --alpha 0.02": lambda: kf.replay(
-        "filter.json", "log.npy", alpha=0.02, estimates=False
-    ),
-    "replay filter.json log.npy --alpha 0.02 -o estimates.npy": lambda: kf.replay(
-        "filter.json", "log.npy", alpha=0.02
-    ),
+    "replay filter.json log.npy --alpha 0.02": lambda: kf.replay("filter.json", "log.npy", alpha=0.02, estimates=False),
+    "replay filter.json log.npy --alpha 0.02 -o estimates.npy": lambda: kf.replay("filter.json", "log.npy", alpha=0.02),
     "replay filter.json log.npy -o smoothed.npy --smooth --end 900": lambda: kf.replay(
         "filter.json", kf.read_log("log.npy", end=900), smooth=True
     ),

@@ -33,8 +33,9 @@ def _axes(ax: Axes | None) -> Axes:
 
 
 def _legend(ax: Axes) -> Axes:
+    # above the lines, which may be anywhere below
     if ax.get_legend_handles_labels()[1]:
-        ax.legend(frameon=False)
+        ax.legend(frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, borderaxespad=0.0)
     return ax
 
 
@@ -73,12 +74,13 @@ def sigma(reports: Sequence[Mapping[str, Any]], until: str | float | None, ax: A
     for report in reports:
         time, total = (np.array(report["predicted"][key], float) for key in ("time_s", "total"))
         lines.setdefault(repr(report["predicted"]["total"]), ([], time, total))[0].append(report["name"])
+    colour: object = None
     for names, time, total in lines.values():
         inside = time > 0.0 if end is None else (time > 0.0) & (time <= end)
-        name = ", ".join(names)
-        # one line with a label of its own needs no names of axes
-        shown = label if label is not None and len(lines) == 1 else f"{label}, {name}" if label is not None else name
-        ax.loglog(time[inside], total[inside], label=shown)
+        # with a label of its own a design is one colour and one entry, however many axes it has
+        shown = ", ".join(names) if label is None else label if colour is None else None
+        (line,) = ax.loglog(time[inside], total[inside], label=shown, color=colour if label is not None else None)
+        colour = line.get_color()
     ax.set_xlabel("time, s")
     ax.set_ylabel("predicted 1 sigma of the drift, SI")
     return _legend(ax)
@@ -118,40 +120,47 @@ def lines(columns: Mapping[str, Floats], names: Sequence[str], ax: Axes | None) 
     return _legend(ax)
 
 
-def estimates(columns: Mapping[str, Floats], ax: Axes | None) -> Axes:
+def estimates(columns: Mapping[str, Floats], axes: Sequence[str], ax: Axes | None) -> Axes:
     """The last state of every axis, which is its drift or bias, with two sigmas."""
     ax = _axes(ax)
     if "time (s)" not in columns:
         raise KfdesignError("the replay has no estimates: ask for them with estimates=True")
     time = columns["time (s)"]
     step = max(len(time) // _POINTS, 1)
-    pairs = [
-        (name, name.replace(" (", "_sigma ("))
-        for name in columns
-        if name.replace(" (", "_sigma (") in columns and not name.split(" (")[0].endswith(("_sigma", "_smoothed"))
-    ]
-    units = {name.rsplit(" (", 1)[-1].rstrip(")") for name, _ in pairs}
-    first = pairs[0][0].rsplit(" (", 1)[-1] if pairs else ""
-    for name, own_sigma in pairs:
-        # one unit on one scale
-        if name.rsplit(" (", 1)[-1] != first:
+    unit = ""
+    for axis in axes:
+        sigmas = [name for name in columns if name.startswith(f"{axis}_") and name.split(" (")[0].endswith("_sigma")]
+        if not sigmas:
             continue
-        (line,) = ax.plot(time[::step], columns[name][::step], label=name.split(" (")[0], linewidth=1.0)
-        low, high = (columns[name] + side * columns[own_sigma] for side in (-2.0, 2.0))
-        ax.fill_between(time[::step], low[::step], high[::step], color=line.get_color(), alpha=0.2, linewidth=0)
+        name = sigmas[-1].replace("_sigma (", " (")
+        unit = name.rsplit(" (", 1)[-1].rstrip(")")
+        values, sigma_of = columns[name][::step], columns[sigmas[-1]][::step]
+        (line,) = ax.plot(time[::step], values, label=name.split(" (")[0], linewidth=1.0)
+        ax.fill_between(
+            time[::step],
+            values - 2.0 * sigma_of,
+            values + 2.0 * sigma_of,
+            color=line.get_color(),
+            alpha=0.2,
+            linewidth=0,
+        )
     ax.set_xlabel("time, s")
-    ax.set_ylabel(f"estimate ± 2 sigma, {first.rstrip(')')}" if units else "estimate")
+    ax.set_ylabel(f"estimate ± 2 sigma, {unit}")
     return _legend(ax)
 
 
 def nees(axes: Sequence[Mapping[str, Any]], ax: Axes | None) -> Axes:
     """Mean NEES over runs, and the band in which it is expected."""
     ax = _axes(ax)
+    bands = set()
     for axis in axes:
         found = axis["nees"]
         time = np.array(found["time_s"], float)
-        (line,) = ax.plot(time, found["mean"], label=axis["name"], linewidth=1.0)
-        ax.fill_between(time, found["lower"], found["upper"], color=line.get_color(), alpha=0.1, linewidth=0)
+        ax.plot(time, found["mean"], label=axis["name"], linewidth=1.0)
+        # axes of as many states have one band
+        if (found["lower"], found["upper"]) not in bands:
+            bands.add((found["lower"], found["upper"]))
+            ax.fill_between(time, found["lower"], found["upper"], color="0.5", alpha=0.15, linewidth=0)
     ax.axhline(float(axes[0]["nees"]["expected"][-1]), color="0.4", linewidth=0.8)
     ax.set_xlabel("time, s")
     ax.set_ylabel("NEES per component, mean of all runs")

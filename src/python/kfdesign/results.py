@@ -690,7 +690,8 @@ class Replay(_Recorded):
     def plot(self, ax: Axes | None = None) -> Axes:
         from . import plot
 
-        return plot.estimates(self.estimates, ax)
+        axes = list(dict.fromkeys(axis["axis"] for axis in self.document["axes"]))
+        return plot.estimates(self.estimates, axes, ax)
 
 
 def _is_innovation(name: str) -> bool:

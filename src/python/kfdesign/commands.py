@@ -345,8 +345,14 @@ def simulate(
         Round to so many.
     truth : bool
         Whether there are columns of truth.
-    plant, aids, motion, accelerometer
-        What the sensor is part of, as in :func:`tune`.
+    plant : str or mapping
+        What the sensor is part of, as in :func:`tune`, like the next three.
+    aids : sequence of str
+        Measurements beside it.
+    motion : str
+        Of the plant rate.
+    accelerometer : Identified, Params or path
+        Of the plants vertical and attitude.
     progress : bool or function
         Show how far it is.
 
@@ -707,8 +713,12 @@ def merge(
     ----------
     shards : sequence of path or MonteCarlo
         In any order.
-    power, confirm, runs_for
-        As in :func:`montecarlo`.
+    power : bool
+        As in :func:`montecarlo`, like the next two.
+    confirm : int
+        Experiments of each size.
+    runs_for : sequence of str
+        Mistunings.
     output : path
         The document.
     progress : bool or function

@@ -53,6 +53,7 @@ class AxisFilter:
 
     @staticmethod
     def of(document: Mapping[str, Any]) -> AxisFilter:
+        """That of a document."""
         count = len(document["states"])
         steady = document["steady_state"]
         return AxisFilter(

@@ -127,12 +127,13 @@ def estimates(columns: Mapping[str, Floats], axes: Sequence[str], ax: Axes | Non
         raise KfdesignError("the replay has no estimates: ask for them with estimates=True")
     time = columns["time (s)"]
     step = max(len(time) // _POINTS, 1)
-    unit = ""
+    unit = state = ""
     for axis in axes:
         sigmas = [name for name in columns if name.startswith(f"{axis}_") and name.split(" (")[0].endswith("_sigma")]
         if not sigmas:
             continue
         name = sigmas[-1].replace("_sigma (", " (")
+        state = name.split(" (")[0].removeprefix(f"{axis}_")
         unit = name.rsplit(" (", 1)[-1].rstrip(")")
         values, sigma_of = columns[name][::step], columns[sigmas[-1]][::step]
         (line,) = ax.plot(time[::step], values, label=name.split(" (")[0], linewidth=1.0)
@@ -145,7 +146,7 @@ def estimates(columns: Mapping[str, Floats], axes: Sequence[str], ax: Axes | Non
             linewidth=0,
         )
     ax.set_xlabel("time, s")
-    ax.set_ylabel(f"estimate ± 2 sigma, {unit}")
+    ax.set_ylabel(f"{state} ± 2 sigma, {unit}")
     return _legend(ax)
 
 
@@ -157,9 +158,10 @@ def nees(axes: Sequence[Mapping[str, Any]], ax: Axes | None) -> Axes:
         found = axis["nees"]
         time = np.array(found["time_s"], float)
         ax.plot(time, found["mean"], label=axis["name"], linewidth=1.0)
-        # axes of as many states have one band
-        if (found["lower"], found["upper"]) not in bands:
-            bands.add((found["lower"], found["upper"]))
+        # axes of as many states have one band, but for the last digits
+        band = (f"{found['lower']:.3g}", f"{found['upper']:.3g}")
+        if band not in bands:
+            bands.add(band)
             ax.fill_between(time, found["lower"], found["upper"], color="0.5", alpha=0.15, linewidth=0)
     ax.axhline(float(axes[0]["nees"]["expected"][-1]), color="0.4", linewidth=0.8)
     ax.set_xlabel("time, s")

@@ -39,6 +39,7 @@ class Measured:
 
     @staticmethod
     def of(document: Mapping[str, Any]) -> Measured:
+        """That of a document."""
         inside = document.get("interval")
         return Measured(document["value"], document["unit"], None if inside is None else (inside[0], inside[1]))
 

@@ -10,7 +10,7 @@ import nbclient
 import nbformat
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE, FIGURES = ROOT / "docs/python.md", ROOT / "docs/figures"
+PAGE, FIGURES = ROOT / "docs/python.md", ROOT / "docs/python"
 START, END = "<!-- notebook: written by tests/python/page.py -->\n", "<!-- end of the notebook -->\n"
 
 
@@ -43,10 +43,10 @@ def main() -> None:
         for one in shown:
             if "image/png" in one.get("data", {}):
                 pictures += 1
-                name = f"python-{pictures}.png"
+                name = f"{pictures}.png"
                 (FIGURES / name).write_bytes(base64.b64decode(one.data["image/png"]))
                 words = one.data.get("text/plain", "figure").splitlines()[0]
-                parts.append(f"![{'figure of the cell above' if words.startswith('<') else words}](figures/{name})")
+                parts.append(f"![{'figure of the cell above' if words.startswith('<') else words}](python/{name})")
     page = PAGE.read_text(encoding="utf-8")
     head, rest = page.split(START)
     tail = rest.split(END)[1]

@@ -55,7 +55,7 @@ def test_pyright(tmp_path: Path) -> None:
 
 def test_stubs_are_those_of_the_module() -> None:
     pytest.importorskip("mypy")
-    run("mypy.stubtest", "kfdesign._native")
+    run("mypy.stubtest", "kfdesign._native", "--mypy-config-file", str(ROOT / "src/python/pyproject.toml"), cwd=HERE)
 
 
 def public() -> Iterator[tuple[str, object]]:

@@ -4,6 +4,8 @@ from collections.abc import Callable, Sequence
 from os import PathLike
 from typing import Any, final
 
+__all__ = ["Outcome", "__version__", "chi_square", "cli", "deviations", "log", "run", "unit", "write"]
+
 __version__: str
 
 _Lent = tuple[str, Sequence[str], int, int, Callable[[int, int, int], bytes]]

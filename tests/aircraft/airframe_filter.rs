@@ -70,16 +70,28 @@ fn close(a: &Value, b: &Value, at: &str) {
     }
 }
 
-/// Its own Monte Carlo finds it consistent, although the spiral that nothing holds grows to 10^16 of its size in ten
-/// minutes. False alarm 1e-3 by the gate, at a seed that passes.
+/// The runs by which `tune` verifies find it consistent, although the spiral that nothing holds grows to 10^16 of its size in
+/// their ten minutes. False alarm 1e-3 by the gate, at a seed that passes.
 #[test]
+fn its_own_runs_find_it_consistent() {
+    let bench = Bench::new();
+    bench.file("params.json", gyro(1.0).to_string());
+    bench.file("flight.json", flight(MODERATE, "15 kt", json!([{ "type": "raw" }])).to_string());
+    let printed = bench.ok("tune params.json --plant airplane --flight flight.json --runs 24 --json");
+    let found: Value = serde_json::from_str(&printed).unwrap();
+    assert_eq!(found["verification"]["verdict"], "consistent", "{printed}");
+}
+
+/// The same at length, with the false alarms of the gate, 1 % within its own interval: servos and registers that only a
+/// known command drives are known in the end, and the gate's law must not stumble on them. Minutes.
+#[test]
+#[ignore = "minutes"]
 fn the_gate_judges_it() {
     let bench = Bench::new();
     tuned(&bench);
     let printed = bench.ok("montecarlo filter.json --runs 16 --duration 600s --seed 3 --json");
     let outcome: Value = serde_json::from_str(&printed).unwrap();
     assert_eq!(outcome["verdict"], "consistent", "{printed}");
-    // servos and registers that only a known command drives are known in the end; the gate's law must not stumble on them
     let rate = outcome["false_alarm_rate"]["value"].as_f64().unwrap();
     assert!((0.006..0.014).contains(&rate), "{}", outcome["false_alarm_rate"]);
 }

@@ -95,14 +95,17 @@ pub fn over_log(data: &OverLog) -> String {
     chart.render()
 }
 
+/// What was computed, what was found over it, and the interval of that.
+pub type FoundPoint = (f64, f64, [f64; 2]);
+
 /// Values that were found beside those that were computed, by group.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Found {
     pub title: String,
     /// Name and unit of what was computed.
     pub x: (String, String),
-    /// Name, and (computed, found over computed, its interval).
-    pub groups: Vec<(String, Vec<(f64, f64, [f64; 2])>)>,
+    /// By name.
+    pub groups: Vec<(String, Vec<FoundPoint>)>,
     /// "95 %".
     pub label: String,
 }

@@ -22,7 +22,7 @@ mod worth;
 
 pub use allan::{Allan, AllanMark, AllanPoint, allan, allan_overlay};
 pub use budget::{BudgetItem, error_budget};
-pub use closed_loop::{Found, Nyquist, OverLog, found, nyquist, over_log};
+pub use closed_loop::{Found, FoundPoint, Nyquist, OverLog, found, nyquist, over_log};
 pub use consistency::{
     Autocorrelation, Histogram, Nees, Periodogram, autocorrelation, cumulative_periodogram, nees, nis_histogram,
 };

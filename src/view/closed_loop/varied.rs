@@ -4,7 +4,7 @@ use super::super::answer::three;
 use crate::aircraft::closed_loop::flown::{Flown, Paired};
 use crate::aircraft::closed_loop::varied::{FeedPoint, Moved, Optimized, Spread, Sweep};
 use crate::aircraft::flight::setting::RateGains;
-use crate::report::figure::{self, Curve, Found, OverLog};
+use crate::report::figure::{self, Curve, Found, FoundPoint, OverLog};
 use crate::report::{Level, Section};
 use crate::units::digits;
 
@@ -149,7 +149,7 @@ const PAIRED: [&str; 7] = ["feed", "rms of", "against", "difference", "95 % from
 const FILTERS: [&str; 6] = ["feed", "of", "NIS", "95 %", "NEES", "95 %"];
 
 fn ratios(flown: &Flown) -> String {
-    let mut groups: Vec<(String, Vec<(f64, f64, [f64; 2])>)> = Vec::new();
+    let mut groups: Vec<(String, Vec<FoundPoint>)> = Vec::new();
     for row in &flown.linear {
         let point = (row.linear, row.simulated / row.linear, [row.lower, row.upper].map(|x| x / row.linear));
         match groups.iter_mut().find(|(name, _)| *name == row.feed) {

@@ -174,7 +174,7 @@ fn identify_study_of_the_recipe() {
             rate.iter_mut().for_each(|x| *x = unit.to_si(*x));
             let found = graphical(&rate, 0.01);
             let [density, _, std_dev, time, _] =
-                [0, 1, 2, 3, 4].map(|i| found.steps[i].value.map_or(f64::NAN, f64::ln));
+                [0, 1, 3, 4, 5].map(|i| found.steps[i].value.map_or(f64::NAN, f64::ln));
             let read = [density, std_dev, time, std_dev + 0.5 * (2.0_f64.ln() - time)];
             [0, 1, 2, 3].map(|i| read[i] - truth[i])
         };
@@ -412,7 +412,7 @@ fn recipe_reads_the_maximum_of_a_long_log() {
     let mut rate = log(&[white(N), gauss_markov(SIGMA, TC)], 108_000, 1.0, 8, 1);
     rate.iter_mut().for_each(|x| *x = unit.to_si(*x));
     let found = graphical(&rate, 1.0);
-    let [density, _, _, time] = [0, 1, 2, 3].map(|i| found.steps[i].value.unwrap());
+    let [density, time] = [0, 4].map(|i| found.steps[i].value.unwrap());
     assert!((density / N - 1.0).abs() < 0.05, "{density}");
     assert!((0.5..2.0).contains(&(time / TC)), "{time}");
 }
@@ -431,14 +431,16 @@ fn recipe_is_faithful_and_says_what_it_costs() {
     // N from the −1/2 stretch: 1e5 and more degrees of freedom
     assert!((value(0) / N - 1.0).abs() < 0.02, "{}", value(0));
     assert!((value(1) - value(0) / dt.sqrt()).abs() < 1e-12);
-    let factor = value(2) / SIGMA;
+    // the scatter of all samples, to which the drift adds its square
+    assert!((value(2).powi(2) / (value(1).powi(2) + SIGMA * SIGMA) - 1.0).abs() < 0.02, "{}", value(2));
+    let factor = value(3) / SIGMA;
     assert!((factor / (1.0 + (N / SIGMA).powi(2)).sqrt() - 1.0).abs() < 0.125, "{factor}");
-    assert!(found.steps[2].cost.contains("times too large"), "{}", found.steps[2].cost);
+    assert!(found.steps[3].cost.contains("times too large"), "{}", found.steps[3].cost);
     let tau_max: f64 =
-        found.steps[3].formula.split("tau_max = ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
-    assert!((value(3) * 1.89 / tau_max - 1.0).abs() < 1e-3);
-    assert!(found.steps[3].cost.contains("degrees of freedom"), "{}", found.steps[3].cost);
-    assert!(found.steps[4].cost.contains("not a flicker floor"), "{}", found.steps[4].cost);
+        found.steps[4].formula.split("tau_max = ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    assert!((value(4) * 1.89 / tau_max - 1.0).abs() < 1e-3);
+    assert!(found.steps[4].cost.contains("degrees of freedom"), "{}", found.steps[4].cost);
+    assert!(found.steps[5].cost.contains("not a flicker floor"), "{}", found.steps[5].cost);
     // the recipe gives no intervals, not even of the bias, and B is not part of its model
     assert_eq!(found.params.bias.unwrap().interval, None);
     assert_eq!(label(&found.model), "GaussMarkov+White");
@@ -447,7 +449,7 @@ fn recipe_is_faithful_and_says_what_it_costs() {
             TermEntry::White { density } => assert!(density.interval.is_none()),
             TermEntry::GaussMarkov { std_dev, correlation_time } => {
                 assert!(std_dev.interval.is_none() && correlation_time.interval.is_none());
-                assert!((std_dev.value - value(2)).abs() < 1e-12 && (correlation_time.value - value(3)).abs() < 1e-9);
+                assert!((std_dev.value - value(3)).abs() < 1e-12 && (correlation_time.value - value(4)).abs() < 1e-9);
             }
             other => panic!("{other:?}"),
         }
@@ -480,9 +482,9 @@ fn worked_example() {
 fn recipe_fills_in_nothing() {
     let found = graphical(&log(&[white(1e-3)], 100_000, 0.01, 9, 0), 0.01);
     assert_eq!(label(&found.model), "White");
-    assert!(found.steps[3].value.is_none());
+    assert!(found.steps[4].value.is_none());
     assert!(found.not_identified.iter().any(|n| n.term == "gauss_markov"));
-    assert!(found.steps[3].what.starts_with("Tc"));
+    assert!(found.steps[4].what.starts_with("Tc"));
 }
 
 // ---------------------------------------------------------------------------------------------------------------

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """The control loop against NumPy, SciPy and python-control: disk and gain margins, rms, damping.
 
-    python -m venv /tmp/peers && /tmp/peers/bin/pip install numpy scipy control
+    python -m venv peers && peers/bin/pip install numpy scipy control
     cargo build --release
-    /tmp/peers/bin/python benches/loop_peers.py target/release/kfdesign
+    peers/bin/python benches/loop_peers.py target/release/kfdesign
 
 The loops are built here once more from the matrices that `kfdesign trim` writes. python-control's disk margins are a
 minimum over a grid; its `stability_margins` falls back on loops of some twenty discrete states and is then wrong, which

@@ -122,15 +122,8 @@ fn whiten(covariance: &DMatrix<f64>, known: &DVector<f64>) -> Coordinates {
     let n = covariance.nrows();
     let open = |i: usize| covariance[(i, i)] > known[i];
     let sigma = DVector::from_fn(n, |i, _| if open(i) { covariance[(i, i)].sqrt() } else { 1.0 });
-    let correlation =
-        DMatrix::from_fn(
-            n,
-            n,
-            |i, j| {
-                if open(i) && open(j) { covariance[(i, j)] / (sigma[i] * sigma[j]) } else { 0.0 }
-            },
-        );
-    let eigen = SymmetricEigen::new(correlation);
+    let correlation = |i, j| if open(i) && open(j) { covariance[(i, j)] / (sigma[i] * sigma[j]) } else { 0.0 };
+    let eigen = SymmetricEigen::new(DMatrix::from_fn(n, n, correlation));
     let root = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
     let inverse = root.map(|r| if r > 1e-8 { 1.0 / r } else { 0.0 });
     Coordinates {

@@ -145,13 +145,12 @@ pub fn run(request: &Request) -> anyhow::Result<Done> {
         return Ok(Done::Attitude(Box::new(attitude::run(request, &name, &params, design)?)));
     }
     let options = TuneOptions { design, flicker_horizon_s: request.flicker_horizon };
-    let (mut params, mut record) = (params, None);
-    let mut tuned;
-    if request.plant.is_airplane() {
-        (params, tuned) = airplane::tuned(request, &params).with_context(|| name.clone())?;
+    let made = if request.plant.is_airplane() {
+        airplane::tuned(request, &params).map(|(axes, tuned)| (axes, tuned, None))
     } else {
-        (tuned, record) = chosen(request, &params, &options, &logs).with_context(|| name.clone())?;
-    }
+        chosen(request, &params, &options, &logs).map(|(tuned, record)| (params, tuned, record))
+    };
+    let (params, mut tuned, record) = made.with_context(|| name.clone())?;
     let truth = request.truth.as_deref().map(|path| Truth::read(path, &tuned, &options)).transpose()?;
     let plan = Plan { runs: request.runs, seed: request.seed, ..Plan::quick(params.sample_rate_hz) };
     let insights = if request.insight { insight(&tuned, &options)? } else { Vec::new() };

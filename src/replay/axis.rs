@@ -122,7 +122,11 @@ impl AxisReplay {
         let settling = design.steady_state.settling_time / model.dt;
         let channels: Vec<Channel> = (0..model.measurements.len()).map(|i| Channel::new(design, i)).collect();
         // what figures show beside the measurement must be what the measurement sees
-        let plain = roles.own == 1 && model.inputs.is_empty() && channels.len() == 1 && !channels[0].angle;
+        let plain = roles.own == 1
+            && model.inputs.is_empty()
+            && channels.len() == 1
+            && !channels[0].angle
+            && design.about.is_empty();
         let seen = || channels[0].row.iter().eq(channels[0].h.iter());
         let stretches =
             (options.form == Form::Joseph && options.gate.is_none() && following.is_none() && plain && seen())
@@ -261,7 +265,7 @@ impl AxisReplay {
     fn follow(&mut self, sensor: f64) {
         let (Some(following), Running::Joseph(kalman)) = (&mut self.following, &mut self.filter) else { return };
         let used = self.channels[0].last.is_some_and(|update| update.accepted);
-        let value = if used { sensor } else { kalman.expected(0) };
+        let value = if used { sensor - self.about.measurements[0] } else { kalman.expected(0) };
         if let Some(model) = following.take(value) {
             kalman.change(&model);
             // the answer to a shift of x0 is that of the design

@@ -92,7 +92,18 @@ fn flights_are_what_their_schema_says() {
         "longitudinal": { "states": [0.01, "0.01", 1, 4], "elevator": 1 },
         "lateral": { "states": [0.01, 0.2, 1, 2], "aileron": 1, "rudder": "1" }
     } });
-    all.extend([other, optimal]);
+    let mut designed = all[0].clone();
+    designed["autopilot"] = json!({ "rate": "100 Hz", "rule": { "short_period_damping": 0.6, "pitch_crossover": "1 rad/s",
+        "bank_crossover": "2 rad/s", "bank_lead": "0.1 s", "dutch_roll_damping": "0.7", "washout": "1 s" } });
+    designed["feeds"] = json!([
+        { "type": "lqg", "longitudinal": { "states": [0.01, 0.01, 1, 4], "elevator": 1 },
+          "lateral": { "states": [0.01, 0.2, 1, 2], "aileron": 1, "rudder": 1 }, "recovery": "1 deg" },
+        { "type": "airframe", "schedule": ["20 m/s", "25 m/s"], "lowpass": { "order": 1, "corner": "20 Hz" } },
+        { "type": "airframe", "name": "file", "filter": "filter.json" }
+    ]);
+    designed["optimize"] =
+        json!({ "surface_rate": 1, "attitude": "0.5", "margins_lost": "5 %", "held_out_wind": "30 kt" });
+    all.extend([other, optimal, designed]);
     agree("flight", &all, |text| FlightDocument::from_json(text, "flight").map(|_| ()).map_err(|e| e.to_string()));
 }
 

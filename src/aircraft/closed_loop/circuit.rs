@@ -11,8 +11,8 @@ use super::half_feed::HalfFeed;
 use super::plant::{Plant, named};
 use super::sensors::Sensors;
 use crate::aircraft::control::response::{StateSpace, diagonal};
-use crate::aircraft::flight::Setting;
-use crate::aircraft::flight::setting::{Control, RateGains};
+use crate::aircraft::flight::setting::Control;
+use crate::aircraft::flight::{RateGains, Setting};
 use crate::model::Named;
 
 /// Where what moves the airplane comes from.

@@ -13,8 +13,8 @@ use super::verdict::{Judgement, best, feed_points};
 use crate::aircraft::airframe::levels::{CAUTION, criteria};
 use crate::aircraft::airframe::modes::{Mode, ModeName};
 use crate::aircraft::control::document::{LinearDocument, ReachDocument};
-use crate::aircraft::flight::Setting;
-use crate::aircraft::flight::setting::{Control, RateGains};
+use crate::aircraft::flight::setting::Control;
+use crate::aircraft::flight::{RateGains, Setting};
 
 pub const FORMAT: &str = "kfdesign-loop/1";
 

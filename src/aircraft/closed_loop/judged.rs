@@ -11,8 +11,8 @@ use super::half_feed::raw;
 use super::{verdict, warnings};
 use crate::aircraft::control::document::Linearized;
 use crate::aircraft::flight::document::{CriteriaEntry, FeedEntry};
-use crate::aircraft::flight::setting::{Control, RateGains};
-use crate::aircraft::flight::{FlightDocument, Setting};
+use crate::aircraft::flight::setting::{Control, same_rate};
+use crate::aircraft::flight::{FlightDocument, RateGains, Setting};
 use crate::units::digits;
 
 /// A loop that was judged, with everything that figures and further questions need.
@@ -55,7 +55,7 @@ impl Judged {
         signs(&setting)?;
         let other = truth.map(|(flight, folder)| Setting::new(flight, folder)).transpose()?;
         if let Some(other) = &other
-            && (other.rate / setting.rate - 1.0).abs() > 1e-9
+            && !same_rate(other.rate, setting.rate)
         {
             return Err(LoopError(format!(
                 "truth: its autopilot has {} Hz, the flight's {} Hz; a loop is judged at one rate",

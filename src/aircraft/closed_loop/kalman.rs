@@ -14,7 +14,7 @@ use super::plant::{Plant, named};
 use super::sensors::{Sensors, with_bias};
 use crate::aircraft::control::margins::margins;
 use crate::aircraft::control::response::StateSpace;
-use crate::aircraft::flight::Setting;
+use crate::aircraft::flight::{Setting, setting};
 use crate::filter::{AIRPLANE, AxisDesign, FilterDesign, steady_state};
 use crate::model::plant::angle;
 use crate::model::{Attached, DRIFT, LinearModel, Output, Port, aid_errors, augment};
@@ -26,8 +26,6 @@ use crate::units::{Quantity, digits};
 
 /// A filter whose white noise differs from that of the gyro by more than this factor is one of another gyro.
 const OTHER_GYRO: f64 = 1.5;
-/// Rates that differ by less are rounding.
-const SAME_RATE: f64 = 1e-9;
 /// A filter that takes over less than this of each measurement does not see the steps that a slow aid makes.
 const SLOW: f64 = 0.3;
 /// Spread of the angle before the first measurement, rad: anything an airplane does.
@@ -100,7 +98,7 @@ pub fn drift_of(setting: &Setting, half: Half, walk: f64, path: &Path) -> Result
             design.quantity.name()
         )));
     }
-    same_rate(&design, setting).map_err(&wrong)?;
+    of_same_rate(&design, setting).map_err(&wrong)?;
     let mut filters = Vec::new();
     for (i, rate) in half.rates().iter().enumerate() {
         let number = half.gyros()[i];
@@ -160,8 +158,8 @@ pub fn drift_of(setting: &Setting, half: Half, walk: f64, path: &Path) -> Result
     Ok(of_drift(setting, half, filters))
 }
 
-fn same_rate(design: &FilterDesign, setting: &Setting) -> Result<(), String> {
-    if (design.sample_rate_hz / setting.rate - 1.0).abs() <= SAME_RATE {
+fn of_same_rate(design: &FilterDesign, setting: &Setting) -> Result<(), String> {
+    if setting::same_rate(design.sample_rate_hz, setting.rate) {
         return Ok(());
     }
     Err(format!(
@@ -471,7 +469,7 @@ pub fn airframe_of(setting: &Setting, half: Half, path: &Path) -> Result<HalfFee
     if design.plant != AIRPLANE {
         return Err(wrong(format!("is of the plant '{}'; an airframe feed takes airplane", design.plant)));
     }
-    same_rate(&design, setting).map_err(&wrong)?;
+    of_same_rate(&design, setting).map_err(&wrong)?;
     let letter = ["x", "y", "z"][half.gyros()[0]];
     let axis = design.axes.iter().find(|axis| axis.name.ends_with(letter));
     let axis = axis.ok_or_else(|| wrong(format!("has no axis {letter}, which has the filter of {}", half.title())))?;

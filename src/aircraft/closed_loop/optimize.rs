@@ -18,8 +18,8 @@ use super::judged::{Judged, without};
 use super::varied::{FeedPoint, HeldOut, Moved, Optimized, OptimizedFeed};
 use super::verdict::{Judgement, feed_points, judge};
 use crate::aircraft::flight::document::{CriteriaEntry, FeedEntry, OptimizeEntry};
-use crate::aircraft::flight::setting::{Control, RateGains};
-use crate::aircraft::flight::{Plan, Setting};
+use crate::aircraft::flight::setting::Control;
+use crate::aircraft::flight::{Plan, RateGains, Setting};
 use crate::numerics::optimize::{Problem, compass, look, minimize};
 use crate::params::Measured;
 use crate::units::{Unit, digits};
@@ -73,15 +73,8 @@ impl Search<'_> {
     fn at(&self, x: &[f64]) -> (Option<f64>, RateGains) {
         let first = usize::from(self.corner().is_some());
         let factor = |i: usize| x[first + i].exp();
-        let RateGains { kq, ktheta, kp, kphi, kr, washout } = self.gains;
-        let gains = RateGains {
-            kq: kq * factor(0),
-            ktheta: ktheta * factor(1),
-            kp: kp * factor(2),
-            kphi: kphi * factor(3),
-            kr: kr * factor(4),
-            washout,
-        };
+        let values = self.gains.values();
+        let gains = RateGains::of(std::array::from_fn(|i| values[i] * factor(i)), self.gains.washout);
         (self.corner().map(|_| x[0].exp()), gains)
     }
 

@@ -11,8 +11,8 @@ use super::half_feed::raw;
 use super::modes::modes;
 use crate::aircraft::control::response::StateSpace;
 use crate::aircraft::flight::document::{GainsEntry, RuleEntry};
-use crate::aircraft::flight::setting::{Control, RateGains};
-use crate::aircraft::flight::{FlightDocument, Setting};
+use crate::aircraft::flight::setting::Control;
+use crate::aircraft::flight::{FlightDocument, RateGains, Setting};
 use crate::numerics::optimize::bracketed_root;
 use crate::params::Measured;
 use crate::units::{Unit, digits};
@@ -34,7 +34,7 @@ pub fn resolved(mut document: FlightDocument, folder: &Path) -> Result<FlightDoc
         document.clone()
     };
     let washout = rule.washout.as_ref().map_or(1.0, Measured::si);
-    let none = RateGains { kq: 0.0, ktheta: 0.0, kp: 0.0, kphi: 0.0, kr: 0.0, washout };
+    let none = RateGains::of([0.0; 5], washout);
     let setting = Setting::new(&with(&none), folder)?;
     Ok(with(&gains(&setting, &rule, none)?))
 }

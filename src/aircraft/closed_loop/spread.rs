@@ -8,7 +8,6 @@ use super::judged::Judged;
 use super::varied::{Kept, Spread};
 use super::verdict::judge;
 use crate::aircraft::airframe::{Airplane, Lateral};
-
 use crate::aircraft::flight::Setting;
 use crate::aircraft::flight::document::UncertaintyEntry;
 use crate::numerics::distribution::NORMAL_95;

@@ -8,9 +8,9 @@
 //!
 //! The regulator is δ = δ₀ − K (x − x₀) of the states u w q θ and v p r φ (`control::regulator`).
 
-/// Gains in SI: s for the rates, plain for the angles.
+/// Gains of rates (s) and angles, SI.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Gains {
+pub struct RateGains {
     pub kq: f64,
     pub ktheta: f64,
     pub kp: f64,
@@ -18,6 +18,20 @@ pub(super) struct Gains {
     pub kr: f64,
     /// Time constant, s.
     pub washout: f64,
+}
+
+impl RateGains {
+    pub const NAMES: [&str; 5] = ["kq", "ktheta", "kp", "kphi", "kr"];
+
+    /// In the order of the names.
+    pub fn values(&self) -> [f64; 5] {
+        [self.kq, self.ktheta, self.kp, self.kphi, self.kr]
+    }
+
+    /// Of values in the order of the names.
+    pub fn of([kq, ktheta, kp, kphi, kr]: [f64; 5], washout: f64) -> RateGains {
+        RateGains { kq, ktheta, kp, kphi, kr, washout }
+    }
 }
 
 /// Feedback of all states, SI.
@@ -33,7 +47,7 @@ pub(super) struct StateFeedback {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Law {
-    Gains(Gains),
+    Gains(RateGains),
     Regulator(StateFeedback),
 }
 
@@ -97,7 +111,7 @@ impl Autopilot {
         let [p, q, r] = [0, 1, 2].map(|i| rate[i] - self.reference.rate[i]);
         let [phi, theta] = [0, 1].map(|i| self.angles[i] - self.reference.angles[i]);
         let [elevator, aileron, rudder] = self.reference.surfaces;
-        let Gains { kq, ktheta, kp, kphi, kr, washout } = match &self.law {
+        let RateGains { kq, ktheta, kp, kphi, kr, washout } = match &self.law {
             Law::Gains(gains) => *gains,
             Law::Regulator(feedback) => {
                 let [u, v, w] = [0, 1, 2].map(|i| velocity[i] - feedback.velocity[i]);

@@ -23,6 +23,7 @@ pub use self::feeds::{FeedEntry, LowpassEntry};
 pub use self::optimize::OptimizeEntry;
 pub use self::rule::RuleEntry;
 pub use self::uncertainty::UncertaintyEntry;
+use super::autopilot::RateGains;
 use crate::aircraft::airframe::AirplaneDocument;
 use crate::aircraft::airframe::trim::{Sideways, TrimRequest, Turn};
 use crate::aircraft::atmosphere::discrete::Form;
@@ -408,6 +409,13 @@ pub struct GainsEntry {
     /// 1 s when absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub washout: Option<Measured>,
+}
+
+impl GainsEntry {
+    pub fn si(&self) -> RateGains {
+        let washout = self.washout.as_ref().map_or(1.0, Measured::si);
+        RateGains::of([self.kq.si(), self.ktheta, self.kp.si(), self.kphi, self.kr.si()], washout)
+    }
 }
 
 impl AutopilotEntry {

@@ -21,6 +21,7 @@ mod streams;
 mod surfaces;
 mod vector;
 
+pub use autopilot::RateGains;
 pub use document::FlightDocument;
 pub use plan::{Plan, STEP, Times};
 pub use report::{ColumnReport, FlightReport, RowSink, RunReport, fly};

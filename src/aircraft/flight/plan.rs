@@ -5,7 +5,7 @@ use std::path::Path;
 use nalgebra::{DMatrix, DVector};
 
 use super::FlightError;
-use super::autopilot::{Gains, Law, Reference, StateFeedback};
+use super::autopilot::{Law, Reference, StateFeedback};
 use super::commands::{self, Commands};
 use super::document::{EarthEntry, FlightDocument, GustEntry, LqrEntry, WindEntry};
 use super::earth::Earth;
@@ -301,14 +301,7 @@ fn autopilot(
         reference.angles[1] = pitch.si();
     }
     let law = match (&entry.gains, &entry.lqr) {
-        (Some(gains), _) => Law::Gains(Gains {
-            kq: gains.kq.si(),
-            ktheta: gains.ktheta,
-            kp: gains.kp.si(),
-            kphi: gains.kphi,
-            kr: gains.kr.si(),
-            washout: gains.washout.as_ref().map_or(1.0, Measured::si),
-        }),
+        (Some(gains), _) => Law::Gains(gains.si()),
         (None, Some(lqr)) => Law::Regulator(state_feedback(lqr, document, airplane).map_err(at("autopilot.lqr"))?),
         (None, None) => return Err(FlightError("autopilot: expected one of gains, lqr and rule".into())),
     };

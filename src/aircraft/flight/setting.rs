@@ -4,6 +4,7 @@ use std::path::Path;
 
 use nalgebra::DMatrix;
 
+use super::autopilot::RateGains;
 use super::document::FlightDocument;
 use super::plan::{gusts, optimal_gains};
 use super::sensors::{Errors, three_axes};
@@ -16,28 +17,11 @@ use crate::aircraft::atmosphere::dryden::Dryden;
 use crate::params::{Measured, Params};
 use crate::units::{Quantity, digits};
 
-/// Rates of sensors and autopilot are the same if they are so to this part.
+/// Two numbers of samples per second are one if they are so to this part: what decimal numbers leave.
 const SAME_RATE: f64 = 1e-9;
 
-/// Gains of rates and angles, SI.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RateGains {
-    pub kq: f64,
-    pub ktheta: f64,
-    pub kp: f64,
-    pub kphi: f64,
-    pub kr: f64,
-    /// Time constant, s.
-    pub washout: f64,
-}
-
-impl RateGains {
-    pub const NAMES: [&str; 5] = ["kq", "ktheta", "kp", "kphi", "kr"];
-
-    /// In the order of the names.
-    pub fn values(&self) -> [f64; 5] {
-        [self.kq, self.ktheta, self.kp, self.kphi, self.kr]
-    }
+pub fn same_rate(a: f64, b: f64) -> bool {
+    (a / b - 1.0).abs() <= SAME_RATE
 }
 
 /// By what the surfaces move.
@@ -111,7 +95,7 @@ impl Setting {
             (None, Some(gyro)) => Some(("sensors.gyro", gyro.sample_rate_hz)),
             (None, None) => None,
         };
-        if let Some((key, found)) = found.filter(|(_, found)| (found / rate - 1.0).abs() > SAME_RATE) {
+        if let Some((key, found)) = found.filter(|(_, found)| !same_rate(*found, rate)) {
             return Err(FlightError(format!(
                 "{key}: {} Hz, the autopilot has {} Hz; the loop is judged at one rate: give sensors.rate and \
                  autopilot.rate the same value",
@@ -135,14 +119,7 @@ impl Setting {
             }
         };
         let control = match (&autopilot.gains, &autopilot.lqr) {
-            (Some(gains), _) => Control::Gains(RateGains {
-                kq: gains.kq.si(),
-                ktheta: gains.ktheta,
-                kp: gains.kp.si(),
-                kphi: gains.kphi,
-                kr: gains.kr.si(),
-                washout: gains.washout.as_ref().map_or(1.0, Measured::si),
-            }),
+            (Some(gains), _) => Control::Gains(gains.si()),
             (None, Some(lqr)) => {
                 let gains = optimal_gains(lqr, &airplane.linear(&trim)).map_err(|e| error("autopilot.lqr", &e))?;
                 Control::Regulator(gains)

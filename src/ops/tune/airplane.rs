@@ -9,6 +9,7 @@ use super::Request;
 use super::objective::ObjectiveArg;
 use crate::aircraft::closed_loop::kalman::airframe_designs;
 use crate::aircraft::closed_loop::sensors::BIAS_WALK;
+use crate::aircraft::flight::setting::same_rate;
 use crate::aircraft::flight::{Setting, three_axes};
 use crate::filter::AIRPLANE;
 use crate::params::Params;
@@ -34,7 +35,7 @@ pub(super) fn tuned(request: &Request, params: &Params) -> anyhow::Result<(Param
     let folder = path.parent().unwrap_or(Path::new("."));
     let mut setting = Setting::new(&document, folder).map_err(|e| named(e.to_string()))?;
     let mut gyro = three_axes(params.clone(), Quantity::AngularRate.dimension(), "a gyro").map_err(|e| anyhow!(e))?;
-    if (gyro.sample_rate_hz / setting.rate - 1.0).abs() > 1e-9 {
+    if !same_rate(gyro.sample_rate_hz, setting.rate) {
         bail!(
             "sample_rate: the gyro has {} Hz, the autopilot of {} {} Hz; a filter has one rate: give both the same",
             digits(gyro.sample_rate_hz),

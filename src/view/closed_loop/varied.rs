@@ -3,7 +3,7 @@
 use super::super::answer::three;
 use crate::aircraft::closed_loop::flown::{Flown, Paired};
 use crate::aircraft::closed_loop::varied::{FeedPoint, Moved, Optimized, Spread, Sweep};
-use crate::aircraft::flight::setting::RateGains;
+use crate::aircraft::flight::RateGains;
 use crate::report::figure::{self, Curve, Found, FoundPoint, OverLog};
 use crate::report::{Level, Section};
 use crate::units::digits;

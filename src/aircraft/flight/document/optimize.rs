@@ -7,15 +7,17 @@ use super::criteria::share;
 use super::uncertainty::{percent, share_schema};
 use super::values::{VELOCITY, value};
 use crate::params::place::{KeyError, Place};
-use crate::params::{Measured, Range};
+use crate::params::{Measured, Plain, Range};
 
 /// The cost is a sum of squares over those of the raw gyro with the gains as they are: wₛ (surface rates)² + wₐ (angles)².
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct OptimizeEntry {
     /// Weight of the rms rates of all surfaces; 1 when absent.
+    #[schemars(with = "Option<Plain>")]
     pub surface_rate: f64,
     /// Weight of the rms of pitch and bank angle; 1 when absent.
+    #[schemars(with = "Option<Plain>")]
     pub attitude: f64,
     /// Part of the raw loop's disk margins and damping that may be lost, "10 %" or 0.1; 10 % when absent.
     #[schemars(schema_with = "share_schema")]

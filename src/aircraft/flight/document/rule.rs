@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::values::{RATE, required, value};
 use crate::params::place::{KeyError, Place};
-use crate::params::{Measured, Range};
+use crate::params::{Measured, Plain, Range};
 use crate::units::Dimension;
 
 /// Rate dampers to a damping, attitude loops to a crossover, on exact sensors with servos and delay.
@@ -13,14 +13,17 @@ use crate::units::Dimension;
 #[serde(deny_unknown_fields)]
 pub struct RuleEntry {
     /// Least damping of the pitch oscillations; 0.6 when absent.
+    #[schemars(with = "Option<Plain>")]
     pub short_period_damping: f64,
     /// Of the loop of the pitch angle.
     pub pitch_crossover: Measured,
     /// Of the loop of the bank angle.
     pub bank_crossover: Measured,
     /// Roll rate over bank angle in the aileron's command; 0.1 s when absent.
+    #[schemars(with = "Option<Measured>")]
     pub bank_lead: Measured,
     /// Least damping of the oscillations of roll and yaw; 0.7 when absent.
+    #[schemars(with = "Option<Plain>")]
     pub dutch_roll_damping: f64,
     /// Time constant of the yaw damper's washout; 1 s when absent.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -47,7 +47,8 @@ fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Every Rust file under src with its path relative to src, sorted. `src/python` is another crate, with rules of its own.
+/// Every Rust file under src with its path relative to src, sorted. `src/python` is another crate, with rules of its
+/// own.
 fn sources() -> Vec<(String, String)> {
     fn walk(dir: &Path, out: &mut Vec<PathBuf>) {
         for entry in std::fs::read_dir(dir).unwrap() {

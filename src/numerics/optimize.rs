@@ -254,9 +254,9 @@ pub fn minimize(problem: &Problem<'_>, start: &[f64], bounds: &[(f64, f64)]) -> 
     best
 }
 
-/// The least value near `start` by steps of `step` along each axis, halved down to `least` while none leads down: kinks and
-/// limits (where f is infinite) do not mislead it. Within `bounds`. Source: Kolda, Lewis and Torczon 2003, SIAM Review
-/// 45(3), compass search.
+/// The least value near `start` by steps of `step` along each axis, halved down to `least` while none leads down:
+/// kinks and limits (where f is infinite) do not mislead it. Within `bounds`. Source: Kolda, Lewis and Torczon 2003,
+/// SIAM Review 45(3), compass search.
 pub fn compass(
     values: impl Fn(&[Vec<f64>]) -> Vec<f64>,
     start: &[f64],

@@ -37,12 +37,13 @@ pub struct Request {
     #[arg(long, value_name = "WHAT", value_parser = Variable::ALL.map(Variable::name))]
     #[serde(default)]
     pub sweep: Option<String>,
-    /// Also judge N airplanes and sensors drawn from the flight's uncertainty and the intervals of the gyro's parameters
+    /// Also judge N airplanes and sensors drawn from the flight's uncertainty and the intervals of the gyro's
+    /// parameters
     #[arg(long, value_name = "N", value_parser = whole::<u64>, allow_negative_numbers = true)]
     #[serde(default)]
     pub spread: Option<u64>,
-    /// Also choose the corner and the gains of each feed by which the cost in the flight is least while the criteria hold;
-    /// with flights, fly these too, from another seed
+    /// Also choose the corner and the gains of each feed by which the cost in the flight is least while the criteria
+    /// hold; with flights, fly these too, from another seed
     #[arg(long)]
     #[serde(default)]
     pub optimize: bool,

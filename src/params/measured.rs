@@ -41,8 +41,8 @@ impl Measured {
     pub fn interval_si(&self) -> Option<[f64; 2]> {
         self.interval.map(|i| i.map(|v| self.unit.to_si(v)))
     }
-    /// Standard deviation of the logarithm by the interval, taken as the 95 % range of a log-normal law; from the closed
-    /// side of one that is open on the other.
+    /// Standard deviation of the logarithm by the interval, taken as the 95 % range of a log-normal law; from the
+    /// closed side of one that is open on the other.
     pub fn log_spread(&self) -> Option<f64> {
         let [lower, upper] = self.interval?;
         let below = (lower > 0.0).then(|| (self.value / lower).ln());

@@ -1,5 +1,4 @@
-//! Requests by name, and what comes of them: its document, its files, its texts. One row per command; no command is
-//! known by more than its row.
+//! Requests by name, and what comes of them: document, files, texts. One row per command, which is known nowhere else.
 
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
@@ -143,14 +142,15 @@ pub(crate) fn make(name: &str, request: &str) -> anyhow::Result<Made> {
         "plan" => row!(plan::run(&asked(request)?)?; d => d; view::plan::plan(d); None),
         "compare" => row!(compare::run(&asked(request)?)?; d => d.0; view::compare::compare(&d.0, &d.1);
             Some("Model and log".into())),
-        "inflate" => row!(inflate::run(&asked(request)?)?; d => d.found; view::inflate::inflate(&d.found, &d.unit); None;
-            d.params.to_json()),
+        "inflate" => row!(inflate::run(&asked(request)?)?; d => d.found;
+            view::inflate::inflate(&d.found, &d.unit); None; d.params.to_json()),
         "simulate" => row!(simulate::run(&asked(request)?)?; d => d; view::simulate::simulate(d); None),
-        "trim" => row!(trim::run(&asked(request)?)?; d => d.document; view::trim::trim(&d.linearized, &d.document); None),
+        "trim" => row!(trim::run(&asked(request)?)?; d => d.document;
+            view::trim::trim(&d.linearized, &d.document); None),
         "fly" => row!(fly::run(&asked(request)?, true)?; d => d.report; view::fly::fly(&d.report, &d.header,
             d.lines.as_ref(), &d.stops); Some(format!("Flight of {}", d.report.airplane))),
-        "loop" => row!(closed_loop::run(&asked(request)?, true)?; d => d.judged.document; view::closed_loop::closed_loop(
-            &d.judged, &d.corners); Some(format!("Control loop of {}", d.judged.document.airplane))),
+        "loop" => row!(closed_loop::run(&asked(request)?, true)?; d => d.judged.document; view::closed_loop::
+            closed_loop(&d.judged, &d.corners); Some(format!("Control loop of {}", d.judged.document.airplane))),
         "tune" => match tune::run(&asked(request)?)? {
             tune::Done::Linear(done) => row!(done; d => d.document()?; view::tune::tune(&d.shown());
                 Some("Tuned filter".into()); d.tuned.design.to_json()),

@@ -175,8 +175,8 @@ pub enum ReplayError {
     )]
     CustomUntold,
     #[error(
-        "the plant has the inputs {inputs}, one of them the sensor; replay then handles no other, montecarlo judges this \
-         filter on simulated runs"
+        "the plant has the inputs {inputs}, one of them the sensor; replay then handles no other, montecarlo judges \
+         this filter on simulated runs"
     )]
     Inputs { inputs: String },
     #[error("axis '{axis}': Q and P0 have no square root: {source}")]

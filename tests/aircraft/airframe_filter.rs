@@ -70,8 +70,8 @@ fn close(a: &Value, b: &Value, at: &str) {
     }
 }
 
-/// The runs by which `tune` verifies find it consistent, although the spiral that nothing holds grows to 10^16 of its size in
-/// their ten minutes. False alarm 1e-3 by the gate, at a seed that passes.
+/// The runs by which `tune` verifies find it consistent, although the spiral that nothing holds grows to 10^16 of
+/// its size in their ten minutes. False alarm 1e-3 by the gate, at a seed that passes.
 #[test]
 fn its_own_runs_find_it_consistent() {
     let bench = Bench::new();
@@ -96,8 +96,8 @@ fn the_gate_judges_it() {
     assert!((0.006..0.014).contains(&rate), "{}", outcome["false_alarm_rate"]);
 }
 
-/// Two minutes of a nonlinear flight in its turbulence through the filter: the command, the other gyro and the attitude are
-/// columns of the log.
+/// Two minutes of a nonlinear flight in its turbulence through the filter: the command, the other gyro and the
+/// attitude are columns of the log.
 #[test]
 fn it_is_replayed_on_a_flight() {
     let bench = Bench::new();

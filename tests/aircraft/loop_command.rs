@@ -71,7 +71,8 @@ fn notes_say_what_a_filter_does_not_do() {
 
 #[test]
 fn a_filter_for_calm_air_is_flagged() {
-    let feeds = json!([{ "type": "raw" }, { "type": "airframe", "wind_at_20ft": "0.5 kt" }, { "type": "airframe", "name": "own" }]);
+    let calm = json!({ "type": "airframe", "wind_at_20ft": "0.5 kt" });
+    let feeds = json!([{ "type": "raw" }, calm, { "type": "airframe", "name": "own" }]);
     let warnings = judged(&flight(MODERATE, "30 kt", feeds)).document.warnings;
     let weak = |name: &str| warnings.iter().any(|w| w.starts_with(name) && w.contains("a large margin of a weak loop"));
     assert!(weak("airframe KF, pitch") && weak("airframe KF, roll and yaw"), "{warnings:?}");

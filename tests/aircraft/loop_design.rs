@@ -20,8 +20,8 @@ fn lqg(recovery: Option<&str>) -> Value {
     feed
 }
 
-/// Optimal gains on estimates have less margin than on true states, and a noise on the commands that the filter believes
-/// in brings it back at the price of surface rate (Doyle and Stein 1979).
+/// Optimal gains on estimates have less margin than on true states, and a noise on the commands that the filter
+/// believes in brings it back at the price of surface rate (Doyle and Stein 1979).
 #[test]
 fn recovery_brings_the_margin_back() {
     let feeds = json!([{ "type": "raw" }, lqg(None), { "name": "little", "type": "lqg", "longitudinal": weights().0,
@@ -40,7 +40,8 @@ fn recovery_brings_the_margin_back() {
     assert!(warned, "{:?}", judged.document.warnings);
 }
 
-/// A schedule is the design of its own airspeed there, and loses less than one design where that is flown off its speed.
+/// A schedule is the design of its own airspeed there, and loses less than one design where that is flown off its
+/// speed.
 #[test]
 fn a_schedule_is_right_at_its_speeds() {
     let feeds = |speed: &str| {
@@ -98,8 +99,8 @@ fn the_price_of_one_design_is_said() {
     }
 }
 
-/// The rule gives what it says, near the sheet's moderate gains, whose rule it is: damping 0.6, crossovers of 1.02 and 2.2
-/// rad/s.
+/// The rule gives what it says, near the sheet's moderate gains, whose rule it is: damping 0.6, crossovers of 1.02
+/// and 2.2 rad/s.
 #[test]
 fn a_rule_gives_gains() {
     let bench = Bench::new();
@@ -118,7 +119,10 @@ fn a_rule_gives_gains() {
     // with the rule's own gains the exact loop has the damping asked for
     let mut exact = document.clone();
     exact["autopilot"].as_object_mut().unwrap().remove("rule");
-    exact["autopilot"]["gains"] = json!({ "kq": format!("{} s", gain("kq")), "ktheta": 0, "kp": format!("{} s", gain("kp")), "kphi": gain("kphi"), "kr": format!("{} s", gain("kr")) });
+    let seconds = |name: &str| format!("{} s", gain(name));
+    exact["autopilot"]["gains"] = json!({
+        "kq": seconds("kq"), "ktheta": 0, "kp": seconds("kp"), "kphi": gain("kphi"), "kr": seconds("kr")
+    });
     exact["sensors"] = json!({});
     let modes = &judged(&exact).document.feeds[0].pitch.modes;
     let damping = modes.iter().find(|mode| mode.eigenvalue[1] > 1.5).unwrap().damping;
@@ -171,8 +175,8 @@ fn a_search_ends_at_a_least_cost() {
     assert!(optimized["feeds"][2]["held_out"]["wind_at_20ft"] == 30.0, "{optimized}");
 }
 
-/// The cost by the numbers of `loop` itself, if every limit is kept: (surface rates)² + (angles)² over those of raw with the
-/// gains as they were; disk margins and damping at least 0.9 of those, damping 0.3, 6 dB.
+/// The cost by the numbers of `loop` itself, if every limit is kept: (surface rates)² + (angles)² over those of raw
+/// with the gains as they were; disk margins and damping at least 0.9 of those, damping 0.3, 6 dB.
 fn cost_of(document: &Value, feed: &Value, gains: &[(&str, f64)], corner: Option<f64>) -> Option<f64> {
     let before = judged(document);
     let mut other = document.clone();

@@ -35,7 +35,8 @@ fn flights_agree_with_the_exact_numbers() {
         let nees = row["nees"][0].as_f64().unwrap();
         assert!((nees - 1.0).abs() < 0.25, "{row}");
     }
-    // in the same gusts a difference of a percent is seen: the drift filter calms the bank angle, as the exact 1.135 -> 1.102
+    // in the same gusts a difference of a percent is seen: the drift filter calms the bank angle, as the exact 1.135
+    // -> 1.102
     let paired = found["paired"].as_array().unwrap();
     assert_eq!(paired.len(), 2 * 8);
     let rate = paired.iter().find(|p| p["feed"] == "airframe KF" && p["quantity"] == "rudder_rate").unwrap();

@@ -230,8 +230,8 @@ fn step(circuit: &Circuit, course: &[DVector<f64>]) -> Step {
     }
 }
 
-/// The first discrete gust of the flight, or, where there is none, one of 3 m/s that rises over 25 m and falls again: up
-/// and from the left.
+/// The first discrete gust of the flight, or, where there is none, one of 3 m/s that rises over 25 m and falls
+/// again: up and from the left.
 pub fn discrete_gust(truth: &Setting) -> DiscreteGust {
     truth.discrete.first().copied().unwrap_or(DiscreteGust {
         form: Form::Return,

@@ -1,7 +1,8 @@
 //! The closed loop of one half: plant, sensors, feed and gains as one linear system.
 //!
-//! Truth: states of the plant and of the sensors' errors. Measured: y = H x + w. The controller has the states of feed
-//! and gains, x_c⁺ = A_c x_c + B_c (y, θc), u = C_c x_c + D_c (y, θc), where the command that the feed knows is its own.
+//! Truth: states of the plant and of the sensors' errors. Measured: y = H x + w. The controller has the states of
+//! feed and gains, x_c⁺ = A_c x_c + B_c (y, θc), u = C_c x_c + D_c (y, θc), where the command that the feed knows is
+//! its own.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -62,8 +63,8 @@ pub struct Circuit {
     pub plant: usize,
     pub truth: usize,
     pub a: DMatrix<f64>,
-    /// Broken at all commands: inputs are those at the airplane, outputs those of the controller with the other sign, so
-    /// that 1 + L is the return difference.
+    /// Broken at all commands: inputs are those at the airplane, outputs those of the controller with the other
+    /// sign, so that 1 + L is the return difference.
     pub broken: StateSpace,
     /// Covariance per sample that each source adds.
     pub sources: Vec<(Source, DMatrix<f64>)>,

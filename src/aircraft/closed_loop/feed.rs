@@ -167,7 +167,10 @@ fn notches(
         let filter = |i: usize| -> Result<StateSpace, LoopError> {
             let line = gyros.get(i).and_then(|gyro| gyro.line);
             let at = frequency.map(Measured::si).or(line).ok_or_else(|| {
-                LoopError(".frequency: missing, and the gyro's parameters have no oscillation; give it, for example \"30 Hz\"".into())
+                LoopError(
+                    ".frequency: missing, and the gyro's parameters have no oscillation; give it, for example \"30 Hz\""
+                        .into(),
+                )
             })?;
             below_half(".frequency", at, setting.rate)?;
             // half the frequency is what autopilots set when nobody says more

@@ -187,8 +187,8 @@ fn interval(values: &[f64]) -> (f64, [f64; 2]) {
     (moments.mean, [moments.mean - half, moments.mean + half])
 }
 
-/// Relative standard error of a rms over one flight of `duration` s: √(Σρ²/2n) with ρ its autocorrelation at the samples
-/// (Bartlett 1935), by the exact covariance of the loop.
+/// Relative standard error of a rms over one flight of `duration` s: √(Σρ²/2n) with ρ its autocorrelation at the
+/// samples (Bartlett 1935), by the exact covariance of the loop.
 fn error_of_one(circuit: &Circuit, state: usize, duration: f64) -> Result<f64, LoopError> {
     let n = circuit.a.nrows();
     let q = circuit.sources.iter().fold(DMatrix::zeros(n, n), |sum, (_, q)| sum + q);

@@ -96,7 +96,8 @@ impl Judged {
             results.iter().find_map(|result| Some((result, result.unstable()?))).filter(|_| stable)
         {
             return Err(LoopError(format!(
-                "feed '{}': the loop of {} is unstable: {} of {} rad/s grows, damping {}; lower the gains, or filter less",
+                "feed '{}': the loop of {} is unstable: {} of {} rad/s grows, damping {}; lower the gains, \
+                 or filter less",
                 result.name,
                 half.title(),
                 mode.name.replace('_', " "),

@@ -84,9 +84,9 @@ pub fn drift(setting: &Setting, half: Half, walk: f64) -> Result<HalfFeed, LoopE
     Ok(of_drift(setting, half, vec![(half.integrated(), Kalman::new(&axis.name, model)?)]))
 }
 
-/// The same by filter.json of the plant angle, vertical or rate. An aid at a lower rate is taken at every sample with the
-/// same density, which is the same filter while it is slow. Errors: a filter of another rate or gyro, of another plant, or
-/// with an aid at another rate that it follows quickly.
+/// The same by filter.json of the plant angle, vertical or rate. An aid at a lower rate is taken at every sample
+/// with the same density, which is the same filter while it is slow. Errors: a filter of another rate or gyro, of
+/// another plant, or with an aid at another rate that it follows quickly.
 pub fn drift_of(setting: &Setting, half: Half, walk: f64, path: &Path) -> Result<HalfFeed, LoopError> {
     let design = FilterDesign::read(path).map_err(|e| LoopError(format!(".filter: {e}")))?;
     let shown = path.display();
@@ -145,8 +145,8 @@ pub fn drift_of(setting: &Setting, half: Half, walk: f64, path: &Path) -> Result
         let quick = (0..every.len()).find(|i| every[*i] as f64 * filter.steady.gain.column(*i).amax() > SLOW);
         if let Some(i) = quick.filter(|i| every[*i] != 1) {
             return Err(wrong(format!(
-                "axis {}: {} is measured every {} samples and moves the estimates too quickly for a loop that is judged \
-                 at one rate; tune it with that aid at {} Hz and the same density",
+                "axis {}: {} is measured every {} samples and moves the estimates too quickly for a loop that is \
+                 judged at one rate; tune it with that aid at {} Hz and the same density",
                 axis.name,
                 filter.model.measurements[i].name,
                 every[i],
@@ -368,8 +368,8 @@ fn about(setting: &Setting, half: Half, model: &LinearModel) -> BTreeMap<String,
     names.zip(commands.chain(rates).chain([angle])).filter(|(_, value)| *value != 0.0).collect()
 }
 
-/// What is known before the first measurement: the airplane somewhere about its trim, surfaces too, the turbulence by its
-/// law.
+/// What is known before the first measurement: the airplane somewhere about its trim, surfaces too, the turbulence
+/// by its law.
 fn prior(setting: &Setting, plant: &Plant) -> Result<DMatrix<f64>, LoopError> {
     let n = plant.size();
     let mut p0 = DMatrix::zeros(n, n);

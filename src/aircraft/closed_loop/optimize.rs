@@ -1,7 +1,8 @@
 //! Corner and gains by which a stated cost is least while the criteria hold and the raw loop's margins stay.
 //!
-//! Each feed has its own: ln of the corner of its low-pass, where it has one, and ln of a factor on each gain. Sequential
-//! quadratic programming with differences of exact covariances and margins; a loop that is unstable is no place at all.
+//! Each feed has its own: ln of the corner of its low-pass, where it has one, and ln of a factor on each gain.
+//! Sequential quadratic programming with differences of exact covariances and margins; a loop that is unstable is no
+//! place at all.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -17,8 +17,8 @@ use crate::numerics::optimize::bracketed_root;
 use crate::params::Measured;
 use crate::units::{Unit, digits};
 
-/// The gain is looked for between these, times s of rate over rad of surface: below the first no damper acts, beyond the
-/// second every servo is in its stop.
+/// The gain is looked for between these, times s of rate over rad of surface: below the first no damper acts, beyond
+/// the second every servo is in its stop.
 const GAINS: (f64, f64) = (1e-3, 10.0);
 /// Steps of the search for the first gain that damps enough: a tenth of a decade each.
 const STEPS: i32 = 40;
@@ -50,8 +50,8 @@ fn gains(setting: &Setting, rule: &RuleEntry, none: RateGains) -> Result<RateGai
     let ktheta = along.angle(&none, &[(2, kq)], &[(ANGLE, 1.0)], rule.pitch_crossover.si());
     let ktheta = ktheta?.ok_or_else(|| {
         LoopError(format!(
-            "autopilot.rule.pitch_crossover: at {} rad/s the damper of kq {} s alone has a loop gain above one; ask for a \
-             faster crossover or less damping",
+            "autopilot.rule.pitch_crossover: at {} rad/s the damper of kq {} s alone has a loop gain above one; ask for \
+             a faster crossover or less damping",
             digits(rule.pitch_crossover.si()),
             digits(kq)
         ))
@@ -112,8 +112,8 @@ impl Loops<'_> {
         )))
     }
 
-    /// The gain k of the states `more` by which |Σ fixed + k Σ more| = 1 at `omega` (rad/s): those of the first surface, whose
-    /// own loop is open while `others` are closed. None where the fixed part alone is above one.
+    /// The gain k of the states `more` by which |Σ fixed + k Σ more| = 1 at `omega` (rad/s): those of the first
+    /// surface, whose own loop is open while `others` are closed. None where the fixed part alone is above one.
     fn angle(
         &self,
         others: &RateGains,

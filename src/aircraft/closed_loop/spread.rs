@@ -36,8 +36,8 @@ pub fn spread(judged: &Judged, uncertainty: &UncertaintyEntry, cases: u64, seed:
     }
     if drawn.is_empty() {
         return Err(LoopError(
-            "uncertainty: nothing to draw; state it, for example \"uncertainty\": { \"aerodynamics\": \"10 %\" }, or give \
-             gyro parameters with intervals"
+            "uncertainty: nothing to draw; state it, for example \"uncertainty\": { \"aerodynamics\": \"10 %\" }, or \
+             give gyro parameters with intervals"
                 .into(),
         ));
     }

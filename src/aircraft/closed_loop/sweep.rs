@@ -1,4 +1,5 @@
-//! The same feeds where one thing is another: corner of the low-pass, noise, airspeed, gust, gain of the surfaces, delay.
+//! The same feeds where one thing is another: corner of the low-pass, noise, airspeed, gust, gain of the surfaces,
+//! delay.
 
 use std::path::Path;
 

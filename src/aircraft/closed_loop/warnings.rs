@@ -11,9 +11,9 @@ use crate::aircraft::flight::Setting;
 use crate::aircraft::flight::setting::Control;
 use crate::units::digits;
 
-/// An answer to gusts this much worse than that of the raw loop, with a margin that is not smaller: the filter has let go
-/// of the airplane. One for a gyro ten times as loud has 1.5 times, for a good reason; one for calm air flown in moderate
-/// turbulence 2.1 to 2.3 times (section 1 of the reference).
+/// An answer to gusts this much worse than that of the raw loop, with a margin that is not smaller: the filter has
+/// let go of the airplane. One for a gyro ten times as loud has 1.5 times, for a good reason; one for calm air flown
+/// in moderate turbulence 2.1 to 2.3 times.
 const WEAKER: f64 = 1.75;
 /// Airspeeds closer than this to the design are within what one design covers: 5 % of speed is 10 % of pressure.
 const OFF_DESIGN: f64 = 0.05;
@@ -65,8 +65,8 @@ fn weak_loop(result: &FeedResult, half: &HalfResult, steady: &Steady, raw: (&Hal
         .find(|(_, (ours, theirs))| ours > theirs)?;
     (gust(steady) > WEAKER * gust(without)).then(|| {
         format!(
-            "{}, {}: a large margin of a weak loop: the {surface} has a disk margin of {} (raw {}), but gusts move {name} \
-             by {} deg rms (raw {}), and the least damping is {} (raw {}). The filter follows its model instead of the \
+            "{}, {}: a large margin of a weak loop: the {surface} has a disk margin of {} (raw {}), but gusts move \
+             {name} by {} deg rms (raw {}), and the least damping is {} (raw {}). The filter follows its model instead of the \
              gyros: was it designed for calmer air?",
             result.name,
             half.circuit.half.title(),

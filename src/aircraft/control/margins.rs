@@ -138,7 +138,7 @@ pub struct LoopMargins {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MarginError {
     /// Growing motions of the closed loop, 1/s.
-    #[error("the closed loop is unstable: {}", .poles.iter().map(|(re, im)| format!("{re:.4} ± {im:.4}i 1/s")).collect::<Vec<_>>().join(", "))]
+    #[error("the closed loop is unstable: {}", shown(.poles))]
     Unstable { poles: Vec<(f64, f64)> },
     #[error("{found} commands: margins are those of one or two at once")]
     Commands { found: usize },
@@ -152,6 +152,11 @@ struct Looked<'a> {
     response: Response,
     /// s, in series with every command; not a part of `system`.
     delay: f64,
+}
+
+/// Poles in 1/s.
+fn shown(poles: &[(f64, f64)]) -> String {
+    poles.iter().map(|(re, im)| format!("{re:.4} ± {im:.4}i 1/s")).collect::<Vec<_>>().join(", ")
 }
 
 /// Margins of L with `system` its state-space form (inputs: commands at the airplane, outputs: what the controller then

@@ -59,7 +59,8 @@ impl StateSpace {
         }
     }
 
-    /// With output fed back to input by `gain` (m × p): A + B K (I − D K)⁻¹ C. `None` where that inverse does not exist.
+    /// With output fed back to input by `gain` (m × p): A + B K (I − D K)⁻¹ C. `None` where that inverse does not
+    /// exist.
     pub fn closed(&self, gain: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let p = self.c.nrows();
         let direct = DMatrix::<f64>::identity(p, p) - &self.d * gain;

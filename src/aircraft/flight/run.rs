@@ -58,8 +58,8 @@ impl Plan {
         })
     }
 
-    /// Flies run number `run` by the commands of `commander` instead of the document's autopilot, with its rate and delay;
-    /// `look` sees every sample. Errors: as of a flight; the document has no autopilot.
+    /// Flies run number `run` by the commands of `commander` instead of the document's autopilot, with its rate and
+    /// delay; `look` sees every sample. Errors: as of a flight; the document has no autopilot.
     pub fn fly_by(
         &self,
         seed: u64,

@@ -160,9 +160,9 @@ impl Setting {
         }
     }
 
-    /// The same airplane, sensors and autopilot at another airspeed (m/s), in turbulence of another wind at 20 ft (m/s);
-    /// intensity goes with that wind, scale lengths stay (MIL-F-8785C, below 1000 ft). Errors: it does not fly there, or
-    /// there is no turbulence with a wind at 20 ft.
+    /// The same airplane, sensors and autopilot at another airspeed (m/s), in turbulence of another wind at 20 ft
+    /// (m/s); intensity goes with that wind, scale lengths stay (MIL-F-8785C, below 1000 ft). Errors: it does not
+    /// fly there, or there is no turbulence with a wind at 20 ft.
     pub fn designed_for(&self, airspeed: Option<f64>, wind_at_20ft: Option<f64>) -> Result<Setting, FlightError> {
         let mut other = self.clone();
         if let Some(speed) = airspeed {

@@ -176,8 +176,9 @@ class Result:
         return Table.of(self.document.get("tests", []))
 
     def __repr__(self) -> str:
-        verdict = f": {self.verdict}, {self.meaning}" if self.verdict else f" {self._about()}"
-        return f"<{type(self).__name__}{verdict.rstrip()}>"
+        about = self.meaning or self._about()
+        said = f": {self.verdict}, {about}" if self.verdict else f" {about}"
+        return f"<{type(self).__name__}{said.rstrip()}>"
 
     def _about(self) -> str:
         return ""

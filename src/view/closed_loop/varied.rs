@@ -203,7 +203,8 @@ pub(super) fn flights<'a>(flown: &'a Flown, paired: &[Paired]) -> Section<'a> {
         )
         .table(
             format!(
-                "In the same gusts and noise; not worse: by less than {} % (one-sided, 2.5 %); better: a test of its own",
+                "In the same gusts and noise; not worse: by less than {} % (one-sided, 2.5 %); better: a test of its \
+                 own",
                 digits(100.0 * flown.margin)
             ),
             &PAIRED,

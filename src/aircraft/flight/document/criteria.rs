@@ -108,7 +108,7 @@ impl JsonSchema for CriteriaEntry {
             "anyOf": [{ "type": "number" }, { "type": "string", "pattern": "^\\s*[-+]?[0-9.]+\\s*(dB)?\\s*$" }]
         });
         let other = json_schema!({
-            "description": "Another feed; where a share stands beside it, worse by no more than that (10 % when absent).",
+            "description": "Another feed; where a share stands beside it, worse by no more than it (10 % when absent).",
             "anyOf": [
                 { "type": "string" },
                 {

@@ -9,7 +9,8 @@ use super::values::{VELOCITY, value};
 use crate::params::place::{KeyError, Place};
 use crate::params::{Measured, Plain, Range};
 
-/// The cost is a sum of squares over those of the raw gyro with the gains as they are: wₛ (surface rates)² + wₐ (angles)².
+/// The cost is a sum of squares over those of the raw gyro with the gains as they are: wₛ (surface rates)² + wₐ
+/// (angles)².
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct OptimizeEntry {

@@ -93,8 +93,10 @@ fn flights_are_what_their_schema_says() {
         "lateral": { "states": [0.01, 0.2, 1, 2], "aileron": 1, "rudder": "1" }
     } });
     let mut designed = all[0].clone();
-    designed["autopilot"] = json!({ "rate": "100 Hz", "rule": { "short_period_damping": 0.6,
-        "pitch_crossover": "1 rad/s", "bank_crossover": "2 rad/s", "bank_lead": "0.1 s", "dutch_roll_damping": "0.7", "washout": "1 s" } });
+    designed["autopilot"] = json!({ "rate": "100 Hz", "rule": {
+        "short_period_damping": 0.6, "dutch_roll_damping": "0.7", "washout": "1 s",
+        "pitch_crossover": "1 rad/s", "bank_crossover": "2 rad/s", "bank_lead": "0.1 s"
+    } });
     designed["feeds"] = json!([
         { "type": "lqg", "longitudinal": { "states": [0.01, 0.01, 1, 4], "elevator": 1 },
           "lateral": { "states": [0.01, 0.2, 1, 2], "aileron": 1, "rudder": 1 }, "recovery": "1 deg" },

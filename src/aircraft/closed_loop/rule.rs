@@ -50,8 +50,8 @@ fn gains(setting: &Setting, rule: &RuleEntry, none: RateGains) -> Result<RateGai
     let ktheta = along.angle(&none, &[(2, kq)], &[(ANGLE, 1.0)], rule.pitch_crossover.si());
     let ktheta = ktheta?.ok_or_else(|| {
         LoopError(format!(
-            "autopilot.rule.pitch_crossover: at {} rad/s the damper of kq {} s alone has a loop gain above one; ask for \
-             a faster crossover or less damping",
+            "autopilot.rule.pitch_crossover: at {} rad/s the damper of kq {} s alone has a loop gain above one; ask \
+             for a faster crossover or less damping",
             digits(rule.pitch_crossover.si()),
             digits(kq)
         ))

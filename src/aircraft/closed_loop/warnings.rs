@@ -66,8 +66,8 @@ fn weak_loop(result: &FeedResult, half: &HalfResult, steady: &Steady, raw: (&Hal
     (gust(steady) > WEAKER * gust(without)).then(|| {
         format!(
             "{}, {}: a large margin of a weak loop: the {surface} has a disk margin of {} (raw {}), but gusts move \
-             {name} by {} deg rms (raw {}), and the least damping is {} (raw {}). The filter follows its model instead of the \
-             gyros: was it designed for calmer air?",
+             {name} by {} deg rms (raw {}), and the least damping is {} (raw {}). The filter \
+             follows its model instead of the gyros: was it designed for calmer air?",
             result.name,
             half.circuit.half.title(),
             digits(ours),

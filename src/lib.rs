@@ -62,6 +62,8 @@ pub mod ops;
 pub mod params;
 pub mod replay;
 pub mod report;
+#[cfg(feature = "serve")]
+pub mod serve;
 pub mod signal;
 pub mod simulate;
 pub mod tune;

@@ -18,11 +18,15 @@ pub mod inflate;
 pub mod info;
 pub mod man;
 pub mod montecarlo;
+pub mod named;
 pub mod output;
 pub mod plan;
 mod plot;
 pub mod replay;
 pub mod schema;
+#[cfg(feature = "serve")]
+pub mod serve;
+pub mod shell;
 mod signals;
 pub mod simulate;
 mod stop;
@@ -35,6 +39,7 @@ use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use self::output::{Detail, exit_status, print_help, say};
+use self::shell::quoted;
 pub use self::signals::watch_signals;
 pub use self::stop::Stop;
 use crate::consistency::Verdict;
@@ -111,6 +116,8 @@ enum Command {
     Export(export::Args),
     Import(import::Args),
     Datasheet(datasheet::Args),
+    #[cfg(feature = "serve")]
+    Serve(serve::Args),
     Schema(schema::Args),
     Completions(completions::Args),
     Man(man::Args),
@@ -167,6 +174,8 @@ pub fn run(args: impl IntoIterator<Item = OsString>, stop: &Stop) -> u8 {
         Command::Export(args) => export::run(&args),
         Command::Import(args) => import::run(&args),
         Command::Datasheet(args) => datasheet::run(&args),
+        #[cfg(feature = "serve")]
+        Command::Serve(args) => serve::run(&args),
         Command::Schema(args) => schema::run(&args),
         Command::Completions(args) => completions::run(&args),
         Command::Man(args) => man::run(&args),
@@ -186,14 +195,6 @@ pub fn run(args: impl IntoIterator<Item = OsString>, stop: &Stop) -> u8 {
 
 /// The command with options that were missing, to copy.
 fn with_options(args: &[OsString], missing: &[(&str, String)]) -> String {
-    let quoted = |word: &str| {
-        let plain = |c: char| c.is_alphanumeric() || "_./,:=+-^".contains(c);
-        if !word.is_empty() && word.chars().all(plain) {
-            word.to_owned()
-        } else {
-            format!("'{}'", word.replace('\'', "'\\''"))
-        }
-    };
     let typed = args.iter().skip(1).map(|word| quoted(&word.to_string_lossy()));
     let options = missing.iter().flat_map(|(option, value)| [format!("--{option}"), quoted(value)]);
     let command: Vec<String> = std::iter::once("kfdesign".into()).chain(typed).chain(options).collect();

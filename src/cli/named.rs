@@ -1,26 +1,26 @@
-//! Requests by name, and what comes of them: document, files, texts. One row per command, which is known nowhere else.
+//! Commands by name: a request as JSON becomes a document, and what else comes of it. One row per command; Python and the
+//! workbench in the browser know of no other.
 
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
 use anyhow::anyhow;
-use kfdesign::cli::output::with_flags;
-use kfdesign::export::junit;
-use kfdesign::filter::FilterDesign;
-use kfdesign::import::Imported;
-use kfdesign::ops::montecarlo::{self, Judged, merge};
-use kfdesign::ops::{
-    allan, closed_loop, compare, datasheet, export, fly, identify, import, inflate, info, plan, replay, simulate, trim,
-    tune,
-};
-use kfdesign::params::Params;
-use kfdesign::report::{Report, html, terminal};
-use kfdesign::view;
-use pyo3::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde_json::Value;
 
-use crate::job::call;
+use super::output::with_flags;
+use crate::export::junit;
+use crate::filter::FilterDesign;
+use crate::import::Imported;
+use crate::ops::montecarlo::{self, Judged, merge};
+use crate::ops::{
+    airplane, allan, closed_loop, compare, datasheet, export, fly, identify, import, inflate, info, plan, replay,
+    simulate, trim, tune,
+};
+use crate::params::Params;
+use crate::report::{Report, html, terminal};
+use crate::view;
 
 /// Characters in a line of a summary, as on a terminal.
 const WIDTH: usize = 80;
@@ -28,38 +28,39 @@ const WIDTH: usize = 80;
 type Shown = Box<dyn Fn(&str) -> anyhow::Result<Option<String>> + Send + Sync>;
 
 /// What was made.
-#[pyclass(frozen, name = "Outcome", module = "kfdesign._native")]
-pub(crate) struct Made {
+pub struct Made {
     /// Byte for byte what the command prints with its `json`.
-    #[pyo3(get)]
-    pub(crate) json: String,
+    pub json: String,
     /// What the command writes with its `output`, where that is not the document above.
-    #[pyo3(get)]
-    pub(crate) file: Option<String>,
+    pub file: Option<String>,
     /// Files of another program; of import, the parameters of every sensor.
-    #[pyo3(get)]
-    pub(crate) files: Vec<(Option<String>, String)>,
-    #[pyo3(get)]
-    pub(crate) notes: Vec<String>,
-    pub(crate) shown: Shown,
+    pub files: Vec<(Option<String>, String)>,
+    shown: Shown,
 }
 
-#[pymethods]
+impl std::fmt::Debug for Made {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Made").field("json", &self.json).finish_non_exhaustive()
+    }
+}
+
 impl Made {
-    /// Texts by name: `brief` and `full` as on a terminal, `page` of HTML, `figures` as SVG, `junit`.
-    fn shown(&self, py: Python<'_>, name: &str) -> PyResult<Option<String>> {
-        // on threads of its own like any work: figures of runs are simulated
-        Ok(call(py, &[], None, None, || (self.shown)(name))?.0)
+    /// Texts by name: `brief` and `full` as on a terminal, `page` of HTML, `figures` as SVG, `junit`, `verdict` in a word, `curves` as JSON;
+    /// `None` where there is none. It may take long: figures of runs are simulated.
+    pub fn shown(&self, name: &str) -> anyhow::Result<Option<String>> {
+        (self.shown)(name)
     }
 }
 
 /// A request: unknown keys and kinds are refused in one line.
-pub(crate) fn asked<R: DeserializeOwned>(request: &str) -> anyhow::Result<R> {
-    serde_json::from_str(request).map_err(|error| {
-        let text = error.to_string();
-        // the text of a request is nobody's file: its line says nothing
-        anyhow!("{}", text.rsplit_once(" at line ").map_or(text.as_str(), |(said, _)| said))
-    })
+pub fn asked<R: DeserializeOwned>(request: &str) -> anyhow::Result<R> {
+    serde_json::from_str(request).map_err(|error| anyhow!(without_place(&error)))
+}
+
+/// The text of a request is nobody's file: its line says nothing.
+pub fn without_place(error: &serde_json::Error) -> String {
+    let text = error.to_string();
+    text.rsplit_once(" at line ").map_or(text.as_str(), |(said, _)| said).to_string()
 }
 
 fn pretty(document: &impl Serialize) -> anyhow::Result<String> {
@@ -73,18 +74,35 @@ macro_rules! row {
         let done = $done;
         let $d = &done;
         let (json, file) = (pretty(&$document)?, None$(.or(Some($file)))?);
-        Made { file, ..made(json, done, move |$d| ($view, $title)) }
+        Made { file, ..made(json, done, move |$d| ($view, Extra::from($title))) }
     }};
+}
+
+/// What there is of a result beside its report.
+struct Extra<'a> {
+    /// Of its figures.
+    title: Option<String>,
+    /// The numbers behind them.
+    curves: Option<Box<dyn Fn() -> Value + 'a>>,
+}
+
+impl From<Option<String>> for Extra<'_> {
+    fn from(title: Option<String>) -> Self {
+        Extra { title, curves: None }
+    }
 }
 
 fn made<D: Send + Sync + 'static>(
     json: String,
     done: D,
-    view: impl for<'a> Fn(&'a D) -> (Report<'a>, Option<String>) + Send + Sync + 'static,
+    view: impl for<'a> Fn(&'a D) -> (Report<'a>, Extra<'a>) + Send + Sync + 'static,
 ) -> Made {
     let shown = move |name: &str| {
-        let (report, figures) = view(&done);
-        text(name, &report, figures)
+        let (report, extra) = view(&done);
+        match (name, extra.curves) {
+            ("curves", curves) => Ok(curves.map(|curves| curves().to_string())),
+            _ => text(name, &report, extra.title),
+        }
     };
     Made { shown: Box::new(shown), ..document(json) }
 }
@@ -95,6 +113,7 @@ fn text(name: &str, report: &Report<'_>, figures: Option<String>) -> anyhow::Res
         "full" => Some(terminal::full(report, None)),
         // byte for byte that of the command
         "page" => Some(with_flags(&html::page(report)?).into_owned()),
+        "verdict" => report.verdict.as_ref().map(|verdict| verdict.word.clone()),
         "figures" => figures.map(|title| report.sheet(&title)),
         _ => None,
     })
@@ -102,7 +121,7 @@ fn text(name: &str, report: &Report<'_>, figures: Option<String>) -> anyhow::Res
 
 /// A document that is read and checked, and written as it is.
 fn document(json: String) -> Made {
-    Made { json, file: None, files: Vec::new(), notes: Vec::new(), shown: Box::new(|_| Ok(None)) }
+    Made { json, file: None, files: Vec::new(), shown: Box::new(|_| Ok(None)) }
 }
 
 fn judged(judged: Judged) -> Made {
@@ -128,7 +147,7 @@ fn imported(found: Imported) -> anyhow::Result<Made> {
 }
 
 #[rustfmt::skip] // a table: one row, one command
-pub(crate) fn make(name: &str, request: &str) -> anyhow::Result<Made> {
+pub fn make(name: &str, request: &str) -> anyhow::Result<Made> {
     Ok(match name {
         "params" => document(Params::read(&asked::<PathBuf>(request)?)?.to_json()),
         "design" => document(FilterDesign::read(&asked::<PathBuf>(request)?)?.to_json()),
@@ -144,13 +163,17 @@ pub(crate) fn make(name: &str, request: &str) -> anyhow::Result<Made> {
             Some("Model and log".into())),
         "inflate" => row!(inflate::run(&asked(request)?)?; d => d.found;
             view::inflate::inflate(&d.found, &d.unit); None; d.params.to_json()),
+        "airplane" => row!(airplane::run(&asked(request)?)?; d => d; view::airplane::airplane(d);
+            Some(format!("Level flight of {}", d.name))),
         "simulate" => row!(simulate::run(&asked(request)?)?; d => d; view::simulate::simulate(d); None),
         "trim" => row!(trim::run(&asked(request)?)?; d => d.document;
             view::trim::trim(&d.linearized, &d.document); None),
         "fly" => row!(fly::run(&asked(request)?, true)?; d => d.report; view::fly::fly(&d.report, &d.header,
             d.lines.as_ref(), &d.stops); Some(format!("Flight of {}", d.report.airplane))),
-        "loop" => row!(closed_loop::run(&asked(request)?, true)?; d => d.judged.document; view::closed_loop::
-            closed_loop(&d.judged, &d.corners); Some(format!("Control loop of {}", d.judged.document.airplane))),
+        "loop" => row!(closed_loop::run(&asked(request)?, true)?; d => d.judged.document;
+            view::closed_loop::closed_loop(&d.judged, &d.corners);
+            Extra { title: Some(format!("Control loop of {}", d.judged.document.airplane)),
+                curves: Some(Box::new(|| view::closed_loop::curves(&d.judged))) }),
         "tune" => match tune::run(&asked(request)?)? {
             tune::Done::Linear(done) => row!(done; d => d.document()?; view::tune::tune(&d.shown());
                 Some("Tuned filter".into()); d.tuned.design.to_json()),
@@ -164,7 +187,8 @@ pub(crate) fn make(name: &str, request: &str) -> anyhow::Result<Made> {
             let filter = asked::<replay::Request>(request)?.filter.display().to_string();
             match replay::run(&asked(request)?)? {
                 replay::Done::Linear(result, unit) => row!((result, unit); d => d.0;
-                    view::replay::replay(&d.0, &filter, d.1.as_ref()); Some("Replay".into())),
+                    view::replay::replay(&d.0, &filter, d.1.as_ref());
+                    Extra { title: Some("Replay".into()), curves: Some(Box::new(|| view::replay::curves(&d.0))) }),
                 replay::Done::Attitude(result, design) => row!((result, design); d => d.0;
                     view::replay::attitude(&d.0, &d.1); None),
             }

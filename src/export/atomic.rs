@@ -94,6 +94,28 @@ impl Drop for Unfinished {
     }
 }
 
+/// A hidden file for as long as this is there; also a process that ends at a signal removes it.
+#[derive(Debug)]
+pub struct Scratch(Unfinished);
+
+impl Scratch {
+    /// In this folder; where that has no name, in the system's for such files.
+    pub fn new(folder: &Path, content: &[u8]) -> Result<Scratch, WriteError> {
+        let own = std::env::temp_dir();
+        let folder = if folder.as_os_str().is_empty() { own.as_path() } else { folder };
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".kfdesign-").suffix(".draft.json");
+        let told = |error: io::Error| io_error(&folder.join("draft"), &error);
+        let (mut file, name) = Unfinished::create(&mut builder, folder).map_err(told)?;
+        file.write_all(content).map_err(told)?;
+        Ok(Scratch(name))
+    }
+
+    pub fn path(&self) -> &Path {
+        self.0.0.as_deref().unwrap_or(Path::new(""))
+    }
+}
+
 /// A file in the making; nothing appears at its path before [`AtomicFile::commit`], and a dropped one leaves nothing
 /// behind.
 ///

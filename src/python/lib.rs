@@ -4,12 +4,12 @@
 mod arrays;
 mod errors;
 mod job;
-mod made;
 
 use std::path::PathBuf;
 
 use kfdesign::allan::{Deviation, deviation::variances};
 use kfdesign::cli;
+use kfdesign::cli::named::{Made, asked, make};
 use kfdesign::export::atomic::AtomicFile;
 use kfdesign::input::{Block, LogReader};
 use kfdesign::numerics::distribution::chi_square_quantile;
@@ -23,7 +23,6 @@ use serde_json::json;
 use crate::arrays::{Lent, bytes, doubles};
 use crate::errors::raised;
 use crate::job::call;
-use crate::made::{Made, asked};
 
 /// What a command is asked for, as JSON, becomes its result. `logs`: those in memory, under their names.
 #[pyfunction]
@@ -34,9 +33,41 @@ fn run(
     logs: Vec<Lent>,
     listener: Option<Py<PyAny>>,
     threads: Option<usize>,
-) -> PyResult<Made> {
-    let (made, notes) = call(py, &logs, listener, threads, || made::make(name, request))?;
-    Ok(Made { notes, ..made })
+) -> PyResult<Outcome> {
+    let (made, notes) = call(py, &logs, listener, threads, || make(name, request))?;
+    Ok(Outcome { made, notes })
+}
+
+/// What was made.
+#[pyclass(frozen, module = "kfdesign._native")]
+struct Outcome {
+    made: Made,
+    #[pyo3(get)]
+    notes: Vec<String>,
+}
+
+#[pymethods]
+impl Outcome {
+    #[getter]
+    fn json(&self) -> &str {
+        &self.made.json
+    }
+
+    #[getter]
+    fn file(&self) -> Option<&str> {
+        self.made.file.as_deref()
+    }
+
+    #[getter]
+    fn files(&self) -> Vec<(Option<String>, String)> {
+        self.made.files.clone()
+    }
+
+    /// Texts by name: `brief` and `full` as on a terminal, `page` of HTML, `figures` as SVG, `junit`.
+    fn shown(&self, py: Python<'_>, name: &str) -> PyResult<Option<String>> {
+        // on threads of its own like any work: figures of runs are simulated
+        Ok(call(py, &[], None, None, || self.made.shown(name))?.0)
+    }
 }
 
 /// A log: what is in it as JSON, notes; where wished, its axes and stamps as bytes of doubles, SI.
@@ -122,7 +153,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     // a panic is caught and raised; what Rust prints about it would not reach a notebook
     std::panic::set_hook(Box::new(|_| {}));
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-    module.add_class::<Made>()?;
+    module.add_class::<Outcome>()?;
     module.add_function(wrap_pyfunction!(run, module)?)?;
     module.add_function(wrap_pyfunction!(log, module)?)?;
     module.add_function(wrap_pyfunction!(unit, module)?)?;

@@ -3,6 +3,7 @@
 mod figures;
 mod varied;
 
+pub use self::figures::curves;
 use crate::aircraft::closed_loop::Judged;
 use crate::aircraft::closed_loop::curves::Corner;
 use crate::aircraft::closed_loop::document::{HalfDocument, LoopDocument, MarginDocument};

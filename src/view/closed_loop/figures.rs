@@ -1,5 +1,8 @@
 //! Figures of a control loop.
 
+use nalgebra::Complex;
+use serde_json::{Value, json};
+
 use crate::aircraft::closed_loop::Judged;
 use crate::aircraft::closed_loop::analysis::{FeedResult, HalfResult};
 use crate::aircraft::closed_loop::curves::{Corner, gain, gust_answer};
@@ -57,6 +60,36 @@ pub(super) fn sections<'a>(judged: &'a Judged, corners: &'a [Corner]) -> Vec<Sec
         out.push(section);
     }
     out
+}
+
+/// What the figures of gusts and loop gains show, as numbers: a page with sliders draws them itself.
+pub fn curves(judged: &Judged) -> Value {
+    let name = |half: usize| judged.raw.halves[half].circuit.half;
+    let gust = (0..HALVES.len()).map(|half| {
+        let feeds = each(judged, half).map(|(result, half)| {
+            let (time, angle): (Vec<f64>, Vec<f64>) =
+                gust_answer(&judged.truth, half).into_iter().map(|(t, x)| (t, x.to_degrees())).unzip();
+            json!({ "name": result.name, "time_s": time, "deg": angle })
+        });
+        json!({ "half": HALVES[half], "angle": name(half).angle_name(), "feeds": feeds.collect::<Vec<_>>() })
+    });
+    let surfaces =
+        (0..HALVES.len()).flat_map(|half| (0..name(half).surfaces().len()).map(move |number| (half, number)));
+    let gain = surfaces.map(|(half, number)| {
+        let feeds = each(judged, half).map(|(result, half)| {
+            let gain = gain(half, number);
+            let of = |part: fn(&(f64, Complex<f64>)) -> f64| gain.iter().map(part).collect::<Vec<f64>>();
+            json!({
+                "name": result.name, "frequency": of(|(w, _)| *w), "re": of(|(_, l)| l.re), "im": of(|(_, l)| l.im),
+                "sensitivity": of(|(_, l)| 1.0 / (l + 1.0).norm()),
+            })
+        });
+        json!({
+            "half": HALVES[half], "surface": surface(&judged.raw.halves[half], number),
+            "feeds": feeds.collect::<Vec<_>>(),
+        })
+    });
+    json!({ "gust": gust.collect::<Vec<_>>(), "gain": gain.collect::<Vec<_>>() })
 }
 
 fn surface(half: &HalfResult, number: usize) -> &'static str {

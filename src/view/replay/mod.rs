@@ -2,6 +2,8 @@
 
 mod attitude;
 
+use serde_json::{Value, json};
+
 use super::answer::{self, three};
 use super::{provenance, verdict};
 use crate::identify::Followed;
@@ -192,7 +194,29 @@ fn figures<'a>(result: &'a ReplayResult, axis: &'a AxisResult, unit: Option<&'a 
     section.figure("Normalised innovations squared beside the law they should follow.", move || histogram(axis))
 }
 
-fn histogram(axis: &AxisResult) -> String {
+/// What the figures show, as numbers in SI: a page with a cursor draws them itself.
+pub fn curves(result: &ReplayResult) -> Value {
+    let axis = |axis: &AxisResult| {
+        let curves = &axis.curves;
+        let column = |of: fn(&Point) -> f64| curves.trace.iter().map(of).collect::<Vec<f64>>();
+        let (edges, observed, expected) = shares(axis);
+        json!({
+            "name": axis.name, "axis": axis.axis, "unit": axis.unit, "samples_per_point": curves.samples_per_point,
+            "trace": {
+                "time_s": column(|p| p.time_s), "measured": column(|p| p.measured), "estimate": column(|p| p.estimate),
+                "sigma": column(|p| p.sigma), "innovation": column(|p| p.innovation),
+                "lowest": column(|p| p.lowest), "highest": column(|p| p.highest),
+            },
+            "autocorrelation": curves.autocorrelation, "autocorrelation_bound": curves.autocorrelation_bound,
+            "cumulative_periodogram": curves.cumulative_periodogram, "periodogram_bound": curves.periodogram_bound,
+            "nis_histogram": { "edges": edges, "observed": observed, "expected": expected },
+        })
+    };
+    json!({ "axes": result.axes.iter().map(axis).collect::<Vec<_>>() })
+}
+
+/// Edges of the bins of NIS, what share of the samples is in each, and what share should be.
+fn shares(axis: &AxisResult) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let bins = &axis.curves.nis_histogram;
     let total: u64 = bins.iter().sum();
     let edges: Vec<f64> = (0..=bins.len()).map(|i| 0.5 * i as f64).collect();
@@ -201,10 +225,17 @@ fn histogram(axis: &AxisResult) -> String {
         true => chi_square_sf(edges[i], 1.0),
         false => chi_square_cdf(edges[i + 1], 1.0) - chi_square_cdf(edges[i], 1.0),
     };
+    let observed = bins.iter().map(|n| *n as f64 / total as f64).collect();
+    let expected = (0..bins.len()).map(law).collect();
+    (edges, observed, expected)
+}
+
+fn histogram(axis: &AxisResult) -> String {
+    let (edges, observed, expected) = shares(axis);
     figure::nis_histogram(&figure::Histogram {
         title: format!("{}: NIS", axis.name),
-        observed: bins.iter().map(|n| *n as f64 / total as f64).collect(),
-        expected: (0..bins.len()).map(law).collect(),
+        observed,
+        expected,
         edges,
         law: "χ²(1)".into(),
     })

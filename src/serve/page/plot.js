@@ -368,6 +368,12 @@ export function figure(keys) {
       settle();
     },
     width,
+    /** What stands at the upright axis. @param {string} label */
+    setAxis(label) {
+      if (keys.y === label) return;
+      keys.y = label;
+      if (u && place.isConnected) build();
+    },
     destroy() {
       resized.disconnect();
       media.forEach((query) => query.removeEventListener("change", repaint));

@@ -265,6 +265,13 @@ export function figure(keys) {
     const handle = Object.assign({}, given, { node });
     describe(node, given);
     let moved = false;
+    /** @param {{x: number, y: number}} to */
+    const move = (to) => {
+      moved = true;
+      Object.assign(handle, to);
+      settle();
+      handle.onMove(to);
+    };
     const done = () => { if (moved) handle.onDone?.(); moved = false; };
     node.addEventListener("pointerdown", (e) => {
       e.preventDefault();
@@ -278,8 +285,7 @@ export function figure(keys) {
       const box = u.over.getBoundingClientRect();
       const x = handle.sideways ? u.posToVal(Math.min(Math.max(e.clientX - box.left, 0), box.width), "x") : handle.x;
       const y = u.posToVal(Math.min(Math.max(e.clientY - box.top, 0), box.height), "y");
-      moved = true;
-      handle.onMove({ x, y });
+      move({ x, y });
     });
     node.addEventListener("lostpointercapture", done);
     node.addEventListener("keydown", (e) => {
@@ -291,8 +297,7 @@ export function figure(keys) {
       const way = ways[e.key];
       if (!way) return;
       e.preventDefault();
-      moved = true;
-      handle.onMove({ x: handle.x * way[0], y: handle.y * way[1] });
+      move({ x: handle.x * way[0], y: handle.y * way[1] });
     });
     node.addEventListener("keyup", (e) => { if (e.key.startsWith("Arrow") || e.key.startsWith("Page")) done(); });
     node.addEventListener("blur", done);

@@ -1,4 +1,5 @@
-// Every command: its document is byte for byte what the command line of its `shell` prints with --json in the same folder.
+// Every command: its document is byte for byte what the command line of its `shell` prints with --json in the same
+// folder.
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import fs from 'node:fs';
@@ -13,8 +14,12 @@ let programs;
 
 before(async () => {
   const place = folder(2);
-  const shards = [['0..10', 'a.json'], ['10..20', 'b.json']];
-  for (const [runs, name] of shards) kfdesign(place, 'montecarlo', 'filter.json', '--runs', runs, '--duration', '60s', '-o', name);
+  const shards = [
+    ['0..10', 'a.json'],
+    ['10..20', 'b.json'],
+  ];
+  for (const [runs, name] of shards)
+    kfdesign(place, 'montecarlo', 'filter.json', '--runs', runs, '--duration', '60s', '-o', name);
   kfdesign(place, 'export', 'params.json', '--to', 'kalibr', '-o', 'imu.yaml');
   programs = fs.mkdtempSync(path.join(os.tmpdir(), 'kfdesign-bin-'));
   fs.symlinkSync(BINARY, path.join(programs, 'kfdesign'));
@@ -35,7 +40,10 @@ const loop = 'flights/aerosonde-loop.json';
 const asked = [
   ['info', { log: 'log.npy' }],
   ['allan', { log: 'log.npy' }],
-  ['allan', { log: 'log.npy', deviation: 'mdev', taus: 'decade', reading: { columns: ['gyro_x'], start: '10', end: '1min' } }],
+  [
+    'allan',
+    { log: 'log.npy', deviation: 'mdev', taus: 'decade', reading: { columns: ['gyro_x'], start: '10', end: '1min' } },
+  ],
   ['identify', { logs: ['log.npy'] }],
   ['identify', { logs: ['log.npy'], method: 'graphical', model: 'white', hold: [], reading: { columns: ['gyro_y'] } }],
   ['identify', { logs: ['log.npy'], model: 'white+gm', hold: ['gauss_markov.correlation_time=200s'] }],
@@ -43,7 +51,10 @@ const asked = [
   ['compare', { params: 'params.json', log: 'log.npy', parameters: true }],
   ['inflate', { params: 'params.json', log: 'log.npy', from: 2 }],
   ['tune', { params: 'params.json', runs: 20 }],
-  ['tune', { params: 'params.json', plant: { plant: 'angle', aid: ['heading: 2 deg @ 1 Hz'] }, insight: true, runs: 20 }],
+  [
+    'tune',
+    { params: 'params.json', plant: { plant: 'angle', aid: ['heading: 2 deg @ 1 Hz'] }, insight: true, runs: 20 },
+  ],
   ['rank', { files: ['filter.json', 'params.json', 'log.npy'] }],
   ['replay', { filter: 'filter.json', log: 'log.npy', alpha: 0.02, form: 'square-root' }],
   ['montecarlo', { filter: 'filter.json', runs: '20', duration: '60s' }],
@@ -81,7 +92,19 @@ test('simulate writes the same log', async () => {
   assert.match(job.shell, /-o page\.npy|--output page\.npy/);
 });
 
-const consumers = ['kalibr', 'openvins', 'vins', 'orbslam3', 'gtsam', 'px4', 'ardupilot', 'matlab', 'gnss-ins-sim', 'navego', 'gazebo'];
+const consumers = [
+  'kalibr',
+  'openvins',
+  'vins',
+  'orbslam3',
+  'gtsam',
+  'px4',
+  'ardupilot',
+  'matlab',
+  'gnss-ins-sim',
+  'navego',
+  'gazebo',
+];
 for (const to of consumers) {
   test(`export to ${to} is what the command prints`, async () => {
     const job = await server.job('export', { params: 'params.json', to });
@@ -91,7 +114,10 @@ for (const to of consumers) {
   });
 }
 
-for (const [to, name] of [['c', 'drift.c'], ['rust', 'drift.rs']]) {
+for (const [to, name] of [
+  ['c', 'drift.c'],
+  ['rust', 'drift.rs'],
+]) {
   test(`export to ${to} is what the command writes`, async () => {
     const job = await server.job('export', { params: 'filter.json', to, output: name });
     assert.equal(job.state, 'done', job.error);
@@ -120,8 +146,12 @@ test('what is saved is what the command writes, and no save replaces unasked', a
 test('report, test report and figures are what the command writes', async () => {
   const gate = await server.job('montecarlo', { filter: 'filter.json', runs: '20', duration: '60s' });
   const looped = await server.job('loop', { flight: loop });
-  const parts = [[gate, 'page', '--report r.html', 'r.html'], [gate, 'junit', '--junit r.xml', 'r.xml'],
-    [looped, 'page', '--report l.html', 'l.html'], [looped, 'figures', '--plot l.svg', 'l.svg']];
+  const parts = [
+    [gate, 'page', '--report r.html', 'r.html'],
+    [gate, 'junit', '--junit r.xml', 'r.xml'],
+    [looped, 'page', '--report l.html', 'l.html'],
+    [looped, 'figures', '--plot l.svg', 'l.svg'],
+  ];
   for (const [job, what, flag, name] of parts) {
     assert.ok(job.has.includes(what), `${job.command}: ${job.has}`);
     const text = await (await server.get(`api/jobs/${job.id}/${what}`)).text();
@@ -135,5 +165,8 @@ test('every command of the command line is asked for', () => {
   const all = [.../^Commands:\n([^]*?)\n\n/m.exec(help)[1].matchAll(/^ {2}(\w+)/gm)].map(([, name]) => name);
   const without = ['schema', 'completions', 'man', 'help', 'serve', 'simulate', 'export'];
   const known = new Set(asked.map(([command]) => command));
-  assert.deepEqual(all.filter((name) => !known.has(name) && !without.includes(name)), []);
+  assert.deepEqual(
+    all.filter((name) => !known.has(name) && !without.includes(name)),
+    [],
+  );
 });

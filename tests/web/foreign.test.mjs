@@ -41,16 +41,27 @@ test('it cannot fetch', { skip: !found }, async () => {
     const body = JSON.stringify({ command: 'info', request: { log: 'params.json' } });
     const json = { 'Content-Type': 'application/json' };
     const ways = [
-      ['', {}], ['api/project', {}], ['api/project', { mode: 'no-cors' }], ['api/project', { credentials: 'include' }],
+      ['', {}],
+      ['api/project', {}],
+      ['api/project', { mode: 'no-cors' }],
+      ['api/project', { credentials: 'include' }],
       ['api/jobs', { method: 'POST', body, headers: json }],
       ['api/jobs', { method: 'POST', body, mode: 'no-cors' }],
       ['api/jobs', { method: 'POST', body: new Blob([body], { type: 'text/plain' }), mode: 'no-cors' }],
-      ['api/upload/foreign.csv', { method: 'PUT', body: 'x' }], ['api/jobs/1', { method: 'DELETE' }],
+      ['api/upload/foreign.csv', { method: 'PUT', body: 'x' }],
+      ['api/jobs/1', { method: 'DELETE' }],
     ];
-    const one = ([route, options]) => fetch(url + route, options).then((answer) => answer.text(), () => '');
+    const one = ([route, options]) =>
+      fetch(url + route, options).then(
+        (answer) => answer.text(),
+        () => '',
+      );
     return Promise.all(ways.map(one));
   }, server.url);
-  assert.deepEqual(seen, seen.map(() => ''));
+  assert.deepEqual(
+    seen,
+    seen.map(() => ''),
+  );
   assert.equal((await (await server.get('api/project')).json()).jobs.length, 0);
   assert.deepEqual(files(server.folder), known);
   await page.close();
@@ -60,15 +71,18 @@ test('its form changes nothing', { skip: !found }, async () => {
   for (const kind of ['text/plain', 'application/x-www-form-urlencoded', 'multipart/form-data']) {
     const page = await open();
     const answer = page.waitForResponse((response) => response.url().startsWith(server.url));
-    await page.evaluate(([action, kind]) => {
-      const form = Object.assign(document.createElement('form'), { method: 'POST', action, enctype: kind });
-      const input = document.createElement('input');
-      input.name = '{"command":"info","request":{"log":"params.json"},"x":"';
-      input.value = '"}';
-      form.append(input);
-      document.body.append(form);
-      form.submit();
-    }, [`${server.url}api/jobs`, kind]);
+    await page.evaluate(
+      ([action, kind]) => {
+        const form = Object.assign(document.createElement('form'), { method: 'POST', action, enctype: kind });
+        const input = document.createElement('input');
+        input.name = '{"command":"info","request":{"log":"params.json"},"x":"';
+        input.value = '"}';
+        form.append(input);
+        document.body.append(form);
+        form.submit();
+      },
+      [`${server.url}api/jobs`, kind],
+    );
     assert.equal((await answer).status(), 403, kind);
     await page.close();
   }
@@ -97,18 +111,33 @@ test('it can neither frame nor open the workbench to look into it', { skip: !fou
 
 test('it can load nothing as script, style or picture', { skip: !found }, async () => {
   const page = await open();
-  const loaded = await page.evaluate((url) => Promise.all(
-    [['script', 'src', 'app.js'], ['script', 'src', 'api/project'], ['img', 'src', 'api/project'], ['link', 'href', 'app.css'],
-      ['script', 'src', 'uPlot.iife.min.js']]
-      .map(([tag, key, route]) => new Promise((resolve) => {
-        const node = document.createElement(tag);
-        if (tag === 'link') node.rel = 'stylesheet';
-        node[key] = url + route;
-        node.onload = () => resolve(route);
-        node.onerror = () => resolve('');
-        document.body.append(node);
-      }))), server.url);
-  assert.deepEqual(loaded, loaded.map(() => ''));
+  const loaded = await page.evaluate(
+    (url) =>
+      Promise.all(
+        [
+          ['script', 'src', 'app.js'],
+          ['script', 'src', 'api/project'],
+          ['img', 'src', 'api/project'],
+          ['link', 'href', 'app.css'],
+          ['script', 'src', 'uPlot.iife.min.js'],
+        ].map(
+          ([tag, key, route]) =>
+            new Promise((resolve) => {
+              const node = document.createElement(tag);
+              if (tag === 'link') node.rel = 'stylesheet';
+              node[key] = url + route;
+              node.onload = () => resolve(route);
+              node.onerror = () => resolve('');
+              document.body.append(node);
+            }),
+        ),
+      ),
+    server.url,
+  );
+  assert.deepEqual(
+    loaded,
+    loaded.map(() => ''),
+  );
   assert.equal(await page.evaluate(() => typeof globalThis.uPlot), 'undefined');
   await page.close();
 });
@@ -116,12 +145,16 @@ test('it can load nothing as script, style or picture', { skip: !found }, async 
 test('it can open neither a WebSocket nor an event stream, and send no beacon', { skip: !found }, async () => {
   const page = await open();
   const opened = await page.evaluate((url) => {
-    const way = (thing) => new Promise((resolve) => {
-      thing.onopen = () => resolve(true);
-      thing.onerror = () => resolve(false);
-    });
+    const way = (thing) =>
+      new Promise((resolve) => {
+        thing.onopen = () => resolve(true);
+        thing.onerror = () => resolve(false);
+      });
     navigator.sendBeacon(`${url}api/jobs`, '{"command":"info","request":{"log":"params.json"}}');
-    return Promise.all([way(new WebSocket(url.replace('http', 'ws'))), way(new EventSource(`${url}api/jobs/1/events`))]);
+    return Promise.all([
+      way(new WebSocket(url.replace('http', 'ws'))),
+      way(new EventSource(`${url}api/jobs/1/events`)),
+    ]);
   }, server.url);
   assert.deepEqual(opened, [false, false]);
   assert.equal((await (await server.get('api/project')).json()).jobs.length, 0);

@@ -65,7 +65,12 @@ test('a request without a length is counted as it comes', async () => {
   // the server may close while the client still writes
   assert.ok([413, 0].includes(answer.status), answer.status);
   const known = files(server.folder);
-  const upload = await server.ask('PUT', `/${server.token}/api/upload/much.csv`, lines.slice(1), start + chunk.repeat(64));
+  const upload = await server.ask(
+    'PUT',
+    `/${server.token}/api/upload/much.csv`,
+    lines.slice(1),
+    start + chunk.repeat(64),
+  );
   assert.ok([413, 0].includes(upload.status), upload.status);
   assert.deepEqual(files(server.folder), known);
 });
@@ -76,8 +81,22 @@ test('an upload has a limit, plain names, and replaces nothing', async () => {
   const before = fs.readFileSync(path.join(server.folder, 'params.json'), 'utf8');
   assert.equal((await server.put('api/upload/params.json', '{}')).status, 409);
   assert.equal(fs.readFileSync(path.join(server.folder, 'params.json'), 'utf8'), before);
-  const names = ['.hidden.csv', '..', 'a b.csv', 'a%2fb.csv', '..%2fa.csv', '%2e%2e%2fa.csv', 'a%00.csv', 'a%5cb.csv',
-    '%3Cimg%20src=x%3E.csv', 'ü.csv', `${'a'.repeat(300)}.csv`, 'a:b.csv', 'flights', ''];
+  const names = [
+    '.hidden.csv',
+    '..',
+    'a b.csv',
+    'a%2fb.csv',
+    '..%2fa.csv',
+    '%2e%2e%2fa.csv',
+    'a%00.csv',
+    'a%5cb.csv',
+    '%3Cimg%20src=x%3E.csv',
+    'ü.csv',
+    `${'a'.repeat(300)}.csv`,
+    'a:b.csv',
+    'flights',
+    '',
+  ];
   for (const name of names) {
     const { status } = await server.ask('PUT', `/${server.token}/api/upload/${name}`, [], 'x');
     assert.ok(status >= 400 && status < 500, `${name}: ${status}`);
@@ -91,11 +110,16 @@ test('an upload has a limit, plain names, and replaces nothing', async () => {
 test('an upload that breaks off leaves nothing', async () => {
   const known = files(server.folder);
   await new Promise((resolve) => {
-    const head = `PUT /${server.token}/api/upload/half.csv HTTP/1.1\r\nHost: 127.0.0.1:${server.port}\r\nContent-Length: 1000\r\n\r\n`;
-    const socket = net.connect(server.port, '127.0.0.1', () => socket.write(head + 'half', () => setTimeout(() => {
-      socket.destroy();
-      resolve();
-    }, 100)));
+    const host = `Host: 127.0.0.1:${server.port}`;
+    const head = `PUT /${server.token}/api/upload/half.csv HTTP/1.1\r\n${host}\r\nContent-Length: 1000\r\n\r\n`;
+    const socket = net.connect(server.port, '127.0.0.1', () =>
+      socket.write(head + 'half', () =>
+        setTimeout(() => {
+          socket.destroy();
+          resolve();
+        }, 100),
+      ),
+    );
   });
   for (let i = 0; i < 100 && files(server.folder).length > known.length; i++) {
     await new Promise((resolve) => setTimeout(resolve, 50));
@@ -105,7 +129,11 @@ test('an upload that breaks off leaves nothing', async () => {
 
 test('a bomb of brackets is refused', async () => {
   const deep = (open, close) => open.repeat(200_000) + close.repeat(200_000);
-  for (const bomb of [deep('[', ']'), deep('{"a":', '}').slice(0, 900_000), `{"command":"info","request":${deep('[', ']')}}`]) {
+  for (const bomb of [
+    deep('[', ']'),
+    deep('{"a":', '}').slice(0, 900_000),
+    `{"command":"info","request":${deep('[', ']')}}`,
+  ]) {
     for (const route of ['api/jobs', 'api/curve', 'api/save', 'api/preview']) {
       const { status } = await server.post(route, bomb);
       assert.ok(status >= 400 && status < 500, `${route}: ${status}`);
@@ -114,9 +142,22 @@ test('a bomb of brackets is refused', async () => {
 });
 
 test('what is no request is refused in one line', async () => {
-  const bodies = ['', '{', 'null', '[]', '"x"', '{}', '{"command":"rm","request":{}}', '{"command":"info"}',
-    '{"command":"info","request":{"log":1}}', '{"command":"info","request":{"log":"params.json","shell":"rm"}}',
-    '{"command":"serve","request":{}}', '{"command":"../x","request":{}}', '\u0000', '{"command":"info","request":null}'];
+  const bodies = [
+    '',
+    '{',
+    'null',
+    '[]',
+    '"x"',
+    '{}',
+    '{"command":"rm","request":{}}',
+    '{"command":"info"}',
+    '{"command":"info","request":{"log":1}}',
+    '{"command":"info","request":{"log":"params.json","shell":"rm"}}',
+    '{"command":"serve","request":{}}',
+    '{"command":"../x","request":{}}',
+    '\u0000',
+    '{"command":"info","request":null}',
+  ];
   for (const body of bodies) {
     const answer = await server.post('api/jobs', body);
     let said = await answer.json();
@@ -126,16 +167,29 @@ test('what is no request is refused in one line', async () => {
 });
 
 test('bytes that are no HTTP are closed', async () => {
-  const all = ['\x16\x03\x01\x02\x00\x01', 'GET\r\n\r\n', 'hello\r\n\r\n', `GET /${server.token}/ HTTP/9.9\r\n\r\n`,
-    `GET /${'x'.repeat(70_000)} HTTP/1.1\r\n\r\n`];
+  const all = [
+    '\x16\x03\x01\x02\x00\x01',
+    'GET\r\n\r\n',
+    'hello\r\n\r\n',
+    `GET /${server.token}/ HTTP/9.9\r\n\r\n`,
+    `GET /${'x'.repeat(70_000)} HTTP/1.1\r\n\r\n`,
+  ];
   for (const bytes of all) {
     const { status } = await server.raw(bytes);
     assert.ok(status === 0 || status >= 400, `${bytes.slice(0, 20)}: ${status}`);
   }
   // two lengths, or length and chunks, let one hide a request behind another
-  const smuggled = [['Content-Length: 2', 'Content-Length: 3'], ['Content-Length: 2', 'Transfer-Encoding: chunked', 'Transfer-Encoding: identity']];
+  const smuggled = [
+    ['Content-Length: 2', 'Content-Length: 3'],
+    ['Content-Length: 2', 'Transfer-Encoding: chunked', 'Transfer-Encoding: identity'],
+  ];
   for (const lines of smuggled) {
-    const { status } = await server.ask('POST', `/${server.token}/api/jobs`, ['Content-Type: application/json', ...lines], '{}');
+    const { status } = await server.ask(
+      'POST',
+      `/${server.token}/api/jobs`,
+      ['Content-Type: application/json', ...lines],
+      '{}',
+    );
     assert.ok(status === 0 || status >= 400, `${lines}: ${status}`);
   }
 });
@@ -166,17 +220,31 @@ test('a hostile log fails its job, not the server', async () => {
   const noise = Buffer.from(Array.from({ length: 5000 }, (_, i) => (i * 7919 + (i >> 3) * 104729) & 255));
   const bomb = zlib.gzipSync(Buffer.alloc(256 << 20), { level: 9 });
   const hostile = {
-    'empty.csv': '', 'header.csv': 'time (s),gyro_x (deg/s)\n', 'binary.csv': noise, 'zeros.npy': Buffer.alloc(4096),
-    'npy.npy': Buffer.concat([Buffer.from('\x93NUMPY\x01\x00\xff\xff', 'latin1'), noise]), 'parquet.parquet': noise,
-    'mat.mat': noise, 'bag.bag': Buffer.concat([Buffer.from('#ROSBAG V2.0\n'), noise]), 'ulog.ulg': Buffer.concat([Buffer.from('ULog\x01\x12\x35\x01', 'latin1'), noise]),
-    'h5.h5': Buffer.concat([Buffer.from('\x89HDF\r\n\x1a\n', 'latin1'), noise]), 'mcap.mcap': Buffer.concat([Buffer.from('\x89MCAP0\r\n', 'latin1'), noise]),
-    'long.csv': `time (s),gyro_x (deg/s)\n${'1'.repeat(500_000)}\n`, 'nan.csv': `time (s),gyro_x (deg/s)\n${'nan,nan\n'.repeat(1000)}`,
-    'huge.csv': `time (s),gyro_x (deg/s)\n0,1e308\n0.01,-1e308\n${'0.02,1e308\n'.repeat(500)}`, 'bomb.csv.gz': bomb,
-    'db.db3': Buffer.concat([Buffer.from('SQLite format 3\0'), noise]), 'params2.json': '{"format":"kfdesign-params/99"}',
+    'empty.csv': '',
+    'header.csv': 'time (s),gyro_x (deg/s)\n',
+    'binary.csv': noise,
+    'zeros.npy': Buffer.alloc(4096),
+    'npy.npy': Buffer.concat([Buffer.from('\x93NUMPY\x01\x00\xff\xff', 'latin1'), noise]),
+    'parquet.parquet': noise,
+    'mat.mat': noise,
+    'bag.bag': Buffer.concat([Buffer.from('#ROSBAG V2.0\n'), noise]),
+    'ulog.ulg': Buffer.concat([Buffer.from('ULog\x01\x12\x35\x01', 'latin1'), noise]),
+    'h5.h5': Buffer.concat([Buffer.from('\x89HDF\r\n\x1a\n', 'latin1'), noise]),
+    'mcap.mcap': Buffer.concat([Buffer.from('\x89MCAP0\r\n', 'latin1'), noise]),
+    'long.csv': `time (s),gyro_x (deg/s)\n${'1'.repeat(500_000)}\n`,
+    'nan.csv': `time (s),gyro_x (deg/s)\n${'nan,nan\n'.repeat(1000)}`,
+    'huge.csv': `time (s),gyro_x (deg/s)\n0,1e308\n0.01,-1e308\n${'0.02,1e308\n'.repeat(500)}`,
+    'bomb.csv.gz': bomb,
+    'db.db3': Buffer.concat([Buffer.from('SQLite format 3\0'), noise]),
+    'params2.json': '{"format":"kfdesign-params/99"}',
   };
   for (const [name, bytes] of Object.entries(hostile)) {
     assert.equal((await server.put(`api/upload/${name}`, bytes)).status, 201, name);
-    const jobs = [['info', { log: name }], ['identify', { logs: [name] }], ['replay', { filter: 'filter.json', log: name }]];
+    const jobs = [
+      ['info', { log: name }],
+      ['identify', { logs: [name] }],
+      ['replay', { filter: 'filter.json', log: name }],
+    ];
     for (const [command, request] of jobs) {
       const job = await server.job(command, request);
       // info may have something to say of a damaged log
@@ -191,7 +259,11 @@ test('a hostile log fails its job, not the server', async () => {
 });
 
 test('a document of a newer format is refused with its name', async () => {
-  const job = await server.job('tune', { params: 'draft:p', runs: 10 }, { drafts: { p: { format: 'kfdesign-params/99' } } });
+  const job = await server.job(
+    'tune',
+    { params: 'draft:p', runs: 10 },
+    { drafts: { p: { format: 'kfdesign-params/99' } } },
+  );
   assert.equal(job.state, 'failed');
   assert.match(job.error, /draft:p/);
   assert.match(job.error, /params\/99/);
@@ -217,7 +289,15 @@ test('a stopped job is stopped, and its result is not there', async () => {
 });
 
 test('of two previews the newer wins', async () => {
-  const slow = { command: 'tune', request: { params: 'params.json', plant: { plant: 'angle', aid: ['heading: 2 deg @ 1 Hz'] }, insight: true, runs: 1000 } };
+  const slow = {
+    command: 'tune',
+    request: {
+      params: 'params.json',
+      plant: { plant: 'angle', aid: ['heading: 2 deg @ 1 Hz'] },
+      insight: true,
+      runs: 1000,
+    },
+  };
   const fast = { command: 'loop', request: { flight: 'flights/aerosonde-loop.json' } };
   const first = server.post('api/preview', slow);
   await new Promise((resolve) => setTimeout(resolve, 200));
@@ -229,13 +309,19 @@ test('of two previews the newer wins', async () => {
 
 /** So many connections that send this and then wait. */
 async function idle(count, text) {
-  const sockets = await Promise.all(Array.from({ length: count }, () => new Promise((resolve) => {
-    const socket = net.connect(server.port, '127.0.0.1', () => {
-      if (text) socket.write(text);
-      resolve(socket);
-    });
-    socket.on('error', () => resolve(socket));
-  })));
+  const sockets = await Promise.all(
+    Array.from(
+      { length: count },
+      () =>
+        new Promise((resolve) => {
+          const socket = net.connect(server.port, '127.0.0.1', () => {
+            if (text) socket.write(text);
+            resolve(socket);
+          });
+          socket.on('error', () => resolve(socket));
+        }),
+    ),
+  );
   return () => sockets.forEach((socket) => socket.destroy());
 }
 
@@ -251,12 +337,18 @@ test('200 half-open requests and 500 idle connections cost nothing', async () =>
 test('a reader that never reads its events holds nobody up', async () => {
   const { id } = await (await server.post('api/jobs', long)).json();
   const head = `GET /${server.token}/api/jobs/${id}/events HTTP/1.1\r\nHost: 127.0.0.1:${server.port}\r\n\r\n`;
-  const slow = await Promise.all(Array.from({ length: 10 }, () => new Promise((resolve) => {
-    const socket = net.connect({ port: server.port, host: '127.0.0.1', highWaterMark: 1 }, () => {
-      socket.pause();
-      socket.write(head, () => resolve(socket));
-    });
-  })));
+  const slow = await Promise.all(
+    Array.from(
+      { length: 10 },
+      () =>
+        new Promise((resolve) => {
+          const socket = net.connect({ port: server.port, host: '127.0.0.1', highWaterMark: 1 }, () => {
+            socket.pause();
+            socket.write(head, () => resolve(socket));
+          });
+        }),
+    ),
+  );
   const seen = await server.get(`api/jobs/${id}/events`);
   const reader = seen.body.getReader();
   let text = '';
@@ -293,7 +385,10 @@ test('Ctrl-C during a job: exit 130, and no unfinished file', async () => {
 });
 
 test('a folder that cannot be served, and a port that is taken', async () => {
-  for (const [place, said] of [['no/such', /no such folder/], ['params.json', /is a file/]]) {
+  for (const [place, said] of [
+    ['no/such', /no such folder/],
+    ['params.json', /is a file/],
+  ]) {
     const { status, stderr } = kfdesign(server.folder, 'serve', place, '--no-open', '--port', '0');
     assert.equal(status, 2);
     assert.match(stderr, said);

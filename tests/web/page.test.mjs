@@ -13,11 +13,20 @@ const own = all.filter((name) => !name.startsWith('uPlot'));
 const text = (name) => fs.readFileSync(path.join(PAGE, name), 'utf8');
 
 test('no text becomes HTML or code', () => {
-  const ways = /innerHTML|outerHTML|insertAdjacentHTML|\beval\b|new Function|document\.write|DOMParser|setHTML|srcdoc|\bjavascript:/;
-  const lines = own.filter((name) => /\.(js|html)$/.test(name))
-    .flatMap((name) => text(name).split('\n').map((line, i) => `${name}:${i + 1}: ${line.trim()}`));
+  const ways =
+    /innerHTML|outerHTML|insertAdjacentHTML|\beval\b|new Function|document\.write|DOMParser|setHTML|srcdoc|javascript:/;
+  const lines = own
+    .filter((name) => /\.(js|html)$/.test(name))
+    .flatMap((name) =>
+      text(name)
+        .split('\n')
+        .map((line, i) => `${name}:${i + 1}: ${line.trim()}`),
+    );
   assert.ok(lines.length > 100);
-  assert.deepEqual(lines.filter((line) => ways.test(line)), []);
+  assert.deepEqual(
+    lines.filter((line) => ways.test(line)),
+    [],
+  );
 });
 
 test('no script, style or handler stands in the HTML, and nothing comes from elsewhere', () => {
@@ -26,7 +35,11 @@ test('no script, style or handler stands in the HTML, and nothing comes from els
   for (const [tag] of html.matchAll(/<script[^>]*>/g)) assert.match(tag, /\ssrc="[\w.]+"/);
   for (const name of own) {
     const outside = text(name).match(/(?:https?:)?\/\/[a-z0-9-]+\.[a-z]{2,}[^\s"']*/gi) ?? [];
-    assert.deepEqual(outside.filter((url) => !url.includes('www.w3.org')), [], name);
+    assert.deepEqual(
+      outside.filter((url) => !url.includes('www.w3.org')),
+      [],
+      name,
+    );
   }
 });
 
@@ -37,15 +50,26 @@ test('the page has at most 200 kB', () => {
 });
 
 test('uPlot is that of its release 1.6.32', () => {
-  const sha256 = (name) => crypto.createHash('sha256').update(fs.readFileSync(path.join(PAGE, name))).digest('hex');
+  const sha256 = (name) =>
+    crypto
+      .createHash('sha256')
+      .update(fs.readFileSync(path.join(PAGE, name)))
+      .digest('hex');
   assert.equal(sha256('uPlot.iife.min.js'), '19c8d4c6ad88929a79f4ae49d6f7161566dfd0ba3d15cc495e974f787eb78f1f');
   assert.equal(sha256('uPlot.min.css'), 'df630c6a8d6f8eeaff264b50f73ce5b114f646ffd9a0bb74f049b0a00135fa04');
   assert.match(text('uPlot.LICENSE'), /MIT/);
 });
 
 test('lines have at most 120 characters', () => {
-  const long = own.flatMap((name) => text(name).split('\n').map((line, i) => [`${name}:${i + 1}`, line.length]));
-  assert.deepEqual(long.filter(([, length]) => length > 120), []);
+  const long = own.flatMap((name) =>
+    text(name)
+      .split('\n')
+      .map((line, i) => [`${name}:${i + 1}`, line.length]),
+  );
+  assert.deepEqual(
+    long.filter(([, length]) => length > 120),
+    [],
+  );
 });
 
 test('types hold', () => {

@@ -47,8 +47,13 @@ async function unchanged(work) {
 test('it listens on loopback alone', () => {
   const port = server.port.toString(16).toUpperCase().padStart(4, '0');
   const listening = ['tcp', 'tcp6'].flatMap((family) =>
-    fs.readFileSync(`/proc/net/${family}`, 'utf8').split('\n').slice(1)
-      .map((line) => line.trim().split(/\s+/)).filter((cells) => cells[1]?.endsWith(`:${port}`) && cells[3] === '0A'));
+    fs
+      .readFileSync(`/proc/net/${family}`, 'utf8')
+      .split('\n')
+      .slice(1)
+      .map((line) => line.trim().split(/\s+/))
+      .filter((cells) => cells[1]?.endsWith(`:${port}`) && cells[3] === '0A'),
+  );
   const own = ['0100007F', '00000000000000000000000001000000'];
   assert.ok(listening.length >= 1);
   for (const [, address] of listening) assert.ok(own.includes(address.split(':')[0]), address);
@@ -71,8 +76,18 @@ test('the token has 192 bits, is new at every start, and stands in no answer and
 
 test('without the token there is nothing, and no hint', async () => {
   const wrong = server.token.replace(/^./, (first) => (first === 'a' ? 'b' : 'a'));
-  const routes = ['/', '/api/project', `/${wrong}/`, `/${wrong}/api/project`, `/${server.token.slice(0, -1)}/`,
-    `/${server.token}`, `/x/${server.token}/`, `//${server.token}/`, '/favicon.ico', `/${server.token.toUpperCase()}x/`];
+  const routes = [
+    '/',
+    '/api/project',
+    `/${wrong}/`,
+    `/${wrong}/api/project`,
+    `/${server.token.slice(0, -1)}/`,
+    `/${server.token}`,
+    `/x/${server.token}/`,
+    `//${server.token}/`,
+    '/favicon.ico',
+    `/${server.token.toUpperCase()}x/`,
+  ];
   const answers = await Promise.all(routes.map((route) => server.ask('GET', route)));
   for (const [i, answer] of answers.entries()) {
     assert.equal(answer.status, 404, routes[i]);
@@ -86,8 +101,17 @@ test('a foreign, missing or second Host is refused', async () => {
   for (const host of [`127.0.0.1:${port}`, `localhost:${port}`, `[::1]:${port}`]) {
     assert.equal((await server.ask('GET', `/${token}/`, [`Host: ${host}`])).status, 200, host);
   }
-  const foreign = [`evil.example:${port}`, 'evil.example', '127.0.0.1', `127.0.0.1:${port + 1}`, `127.0.0.1.evil:${port}`,
-    `0.0.0.0:${port}`, `127.1:${port}`, `user@127.0.0.1:${port}`, ''];
+  const foreign = [
+    `evil.example:${port}`,
+    'evil.example',
+    '127.0.0.1',
+    `127.0.0.1:${port + 1}`,
+    `127.0.0.1.evil:${port}`,
+    `0.0.0.0:${port}`,
+    `127.1:${port}`,
+    `user@127.0.0.1:${port}`,
+    '',
+  ];
   for (const host of foreign) {
     const answer = await server.ask('GET', `/${token}/`, [`Host: ${host}`]);
     assert.ok([400, 421].includes(answer.status), `${host}: ${answer.status}`);
@@ -107,8 +131,15 @@ test('a foreign Origin, and none that is null, may not ask', async () => {
   const { port, token } = server;
   const asked = (origin) => server.ask('GET', `/${token}/api/project`, [`Origin: ${origin}`]);
   assert.equal((await asked(`http://127.0.0.1:${port}`)).status, 200);
-  const foreign = ['null', 'http://evil.example', `https://127.0.0.1:${port}`, `http://127.0.0.1:${port + 1}`,
-    `http://127.0.0.1:${port}.evil.example`, 'file://', ''];
+  const foreign = [
+    'null',
+    'http://evil.example',
+    `https://127.0.0.1:${port}`,
+    `http://127.0.0.1:${port + 1}`,
+    `http://127.0.0.1:${port}.evil.example`,
+    'file://',
+    '',
+  ];
   for (const origin of foreign) assert.equal((await asked(origin)).status, 403, origin);
   await unchanged(async () => {
     const lines = ['Origin: null', 'Content-Type: application/json'];
@@ -126,8 +157,13 @@ test('what another site asks for is refused', async () => {
 
 test('a POST is JSON and says so', async () => {
   await unchanged(async () => {
-    for (const kind of ['text/plain', 'application/x-www-form-urlencoded', 'multipart/form-data; boundary=x',
-      'text/plain; application/json', 'application/jsonx']) {
+    for (const kind of [
+      'text/plain',
+      'application/x-www-form-urlencoded',
+      'multipart/form-data; boundary=x',
+      'text/plain; application/json',
+      'application/jsonx',
+    ]) {
       for (const route of ['api/jobs', 'api/curve', 'api/save', 'api/jobs/1/save']) {
         assert.equal((await server.post(route, info, { 'Content-Type': kind })).status, 415, `${route} ${kind}`);
       }
@@ -152,7 +188,8 @@ test('nobody may ask whether they may ask', async () => {
 });
 
 test('every answer keeps the page closed', async () => {
-  const policy = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; " +
+  const policy =
+    "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; " +
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
   const routes = ['', 'app.js', 'app.css', 'uPlot.iife.min.js', 'api/project', 'api/jobs/999999', 'no/such'];
   for (const route of routes) {
@@ -179,16 +216,54 @@ test('a report may not run scripts', async () => {
 
 /** Names that lead elsewhere. */
 function elsewhere() {
-  return ['../secret.csv', `${outside}/secret.csv`, 'linked/secret.csv', 'link.csv', './../x/secret.csv',
-    'flights/../../secret.csv', '/etc/passwd', '/dev/zero', '/proc/self/environ', 'fifo.csv', 'flights', '.',
-    '.hidden.csv', '.kfdesign/draft.json', 'C:\\secret.csv', 'C:secret.csv', 'flights\\..\\secret.csv', 'params.json\0.csv',
-    '\0', '', '~/secret.csv', 'file:///etc/passwd', '//etc/passwd'];
+  return [
+    '../secret.csv',
+    `${outside}/secret.csv`,
+    'linked/secret.csv',
+    'link.csv',
+    './../x/secret.csv',
+    'flights/../../secret.csv',
+    '/etc/passwd',
+    '/dev/zero',
+    '/proc/self/environ',
+    'fifo.csv',
+    'flights',
+    '.',
+    '.hidden.csv',
+    '.kfdesign/draft.json',
+    'C:\\secret.csv',
+    'C:secret.csv',
+    'flights\\..\\secret.csv',
+    'params.json\0.csv',
+    '\0',
+    '',
+    '~/secret.csv',
+    'file:///etc/passwd',
+    '//etc/passwd',
+  ];
 }
 
 test('no path leads out of the assets', async () => {
-  const paths = ['../Cargo.toml', '..%2fparams.json', '%2e%2e/params.json', '%2e%2e%2f%2e%2e%2fetc/passwd', '//etc/passwd',
-    '/etc/passwd', '..\\params.json', '..%5cparams.json', 'app.js%00.html', '%00', 'C:/x', 'params.json', '.hidden.csv',
-    'fifo.csv', './app.js/', 'link.csv', 'api/../app.js/..', 'api/upload/../../x'];
+  const paths = [
+    '../Cargo.toml',
+    '..%2fparams.json',
+    '%2e%2e/params.json',
+    '%2e%2e%2f%2e%2e%2fetc/passwd',
+    '//etc/passwd',
+    '/etc/passwd',
+    '..\\params.json',
+    '..%5cparams.json',
+    'app.js%00.html',
+    '%00',
+    'C:/x',
+    'params.json',
+    '.hidden.csv',
+    'fifo.csv',
+    './app.js/',
+    'link.csv',
+    'api/../app.js/..',
+    'api/upload/../../x',
+  ];
   for (const one of paths) {
     const answer = await server.ask('GET', `/${server.token}/${one}`);
     assert.ok([400, 403, 404, 405].includes(answer.status), `${one}: ${answer.status}`);
@@ -208,15 +283,23 @@ test('no series of a file outside of the folder, of a link, a pipe or a hidden f
 test('no job reads outside of the folder', async () => {
   await unchanged(async () => {
     for (const name of elsewhere().filter(Boolean)) {
-      const requests = [['info', { log: name }], ['tune', { params: name }], ['identify', { logs: [name] }],
-        ['replay', { filter: name, log: name }], ['loop', { flight: name }],
+      const requests = [
+        ['info', { log: name }],
+        ['tune', { params: name }],
+        ['identify', { logs: [name] }],
+        ['replay', { filter: name, log: name }],
+        ['loop', { flight: name }],
         ['tune', { params: 'params.json', plant: { plant: name } }],
         ['tune', { params: 'params.json', plant: { accelerometer: `${name}:x` } }],
-        ['simulate', { params: 'params.json', output: 'o.csv', true_rate: `file:${name}` }]];
+        ['simulate', { params: 'params.json', output: 'o.csv', true_rate: `file:${name}` }],
+      ];
       for (const [command, request] of requests) {
         const answer = await server.post('api/jobs', { command, request });
         const body = await answer.text();
-        assert.ok([400, 403, 404, 422].includes(answer.status), `${command} ${JSON.stringify(name)}: ${answer.status} ${body}`);
+        assert.ok(
+          [400, 403, 404, 422].includes(answer.status),
+          `${command} ${JSON.stringify(name)}: ${answer.status} ${body}`,
+        );
         assert.ok(!body.includes(SECRET), name);
       }
     }
@@ -225,10 +308,21 @@ test('no job reads outside of the folder', async () => {
 
 test('no document that is sent names a file outside of the folder', async () => {
   const flight = JSON.parse(fs.readFileSync(path.join(server.folder, 'flights/aerosonde.json'), 'utf8'));
-  for (const name of [`${outside}/secret.json`, '../secret.json', '/etc/passwd', 'linked/secret.json', '.kfdesign/draft.json']) {
-    for (const draft of [{ ...flight, airplane: name }, { ...flight, sensors: { ...flight.sensors, gyro: name } }]) {
+  for (const name of [
+    `${outside}/secret.json`,
+    '../secret.json',
+    '/etc/passwd',
+    'linked/secret.json',
+    '.kfdesign/draft.json',
+  ]) {
+    for (const draft of [
+      { ...flight, airplane: name },
+      { ...flight, sensors: { ...flight.sensors, gyro: name } },
+    ]) {
       const answer = await server.post('api/jobs', {
-        command: 'loop', request: { flight: 'draft:f' }, drafts: { f: draft },
+        command: 'loop',
+        request: { flight: 'draft:f' },
+        drafts: { f: draft },
       });
       let body = await answer.json();
       if (answer.status === 202) body = await server.finished(body.id);
@@ -241,9 +335,18 @@ test('no document that is sent names a file outside of the folder', async () => 
 
 test('no job writes outside of the folder', async () => {
   await unchanged(async () => {
-    for (const output of [`${outside}/new.csv`, '../new.csv', 'linked/new.csv', 'dangling.json', '.new.csv', 'a\\b.csv', '/dev/shm/new.csv']) {
+    for (const output of [
+      `${outside}/new.csv`,
+      '../new.csv',
+      'linked/new.csv',
+      'dangling.json',
+      '.new.csv',
+      'a\\b.csv',
+      '/dev/shm/new.csv',
+    ]) {
       const answer = await server.post('api/jobs', {
-        command: 'simulate', request: { params: 'params.json', output, duration: '1s' },
+        command: 'simulate',
+        request: { params: 'params.json', output, duration: '1s' },
       });
       assert.equal(answer.status, 403, output);
       const saved = await server.post('api/save', { name: output, text: 'x' });
@@ -303,11 +406,16 @@ test('a read-only server writes nothing', async () => {
 });
 
 test('an address in the network is refused', async () => {
-  const addresses = Object.values(os.networkInterfaces()).flat().filter((one) => !one.internal && one.family === 'IPv4');
+  const addresses = Object.values(os.networkInterfaces())
+    .flat()
+    .filter((one) => !one.internal && one.family === 'IPv4');
   for (const { address } of addresses) {
-    await assert.rejects(new Promise((resolve, reject) => {
-      const socket = net.connect(server.port, address, resolve).on('error', reject);
-      socket.on('connect', () => socket.destroy());
-    }), address);
+    await assert.rejects(
+      new Promise((resolve, reject) => {
+        const socket = net.connect(server.port, address, resolve).on('error', reject);
+        socket.on('connect', () => socket.destroy());
+      }),
+      address,
+    );
   }
 });

@@ -51,7 +51,12 @@ export async function serve(place, ...options) {
   const [, port, token] = /^http:\/\/127\.0\.0\.1:(\d+)\/([^/]+)\/$/.exec(url) ?? [];
   if (!token) throw new Error(`expected an address with a token: ${url}`);
   return {
-    url, port: Number(port), token, folder: place, pid: child.pid, ended,
+    url,
+    port: Number(port),
+    token,
+    folder: place,
+    pid: child.pid,
+    ended,
     /** What it has said on stderr so far. */
     said: () => said,
     signal: (name) => child.kill(name),

@@ -84,7 +84,7 @@ export const panel = {
     let shown = [];
     /** As identified, for the dashed line behind. @type {{key: string, axes: AxisResult[]} | null} */
     let base = null;
-    /** @type {api.Job | null} */
+    /** @type {import("./api.js").Job | null} */
     let verified = null;
     /** @type {any} */
     let document = null;

@@ -49,7 +49,7 @@ export const panel = {
   title: "Log",
   show(root, ctx) {
     const { api } = ctx;
-    /** @type {api.Head | null} */
+    /** @type {import("./api.js").Head | null} */
     let head = null;
     let drawn = "";
     /** @type {ReturnType<typeof figure>[]} */
@@ -260,19 +260,21 @@ export const panel = {
         if (drawn !== key) return;
         fill(facts);
         fail(/** @type {Error} */ (error));
-        const missing = /** @type {api.ApiError} */ (error).missing ?? [];
+        const missing = /** @type {import("./api.js").ApiError} */ (error).missing ?? [];
         if (missing.length) how.open = true;
-        const first = { unit, rate, columns, time, topic, sensor }[missing[0] ?? ""];
+        /** @type {Record<string, {input: HTMLElement}>} */
+        const fields = { unit, rate, columns, time, topic, sensor };
+        const first = fields[missing[0]];
         first?.input.focus();
         return;
       }
-      const { check } = head;
-      facts.textContent = `${check.samples} samples, ${number(head.rate)} Hz, ${duration(head.seconds)}, ${head.axes.length} ${head.axes.length === 1 ? "axis" : "axes"} in ${head.unit}`;
+      const { check, axes, rate: hz, seconds, unit: shown } = head;
+      facts.textContent = `${check.samples} samples, ${number(hz)} Hz, ${duration(seconds)}, ${axes.length} ${axes.length === 1 ? "axis" : "axes"} in ${shown}`;
       announce(facts.textContent);
       chosen.hidden = false;
-      traces = head.axes.slice(0, MOST_AXES).map((name) => figure({
-        title: name, x: "time from the start (s)", y: head?.unit ?? "", height: 190, sync: "log", legend: false,
-        onRange: (a, b) => setRange(Math.max(0, Number(a.toPrecision(5))), Number(Math.min(b, head?.seconds ?? b).toPrecision(5))),
+      traces = axes.slice(0, MOST_AXES).map((/** @type {string} */ name) => figure({
+        title: name, x: "time from the start (s)", y: shown, height: 190, sync: "log", legend: false,
+        onRange: (a, b) => setRange(Math.max(0, Number(a.toPrecision(5))), Number(Math.min(b, seconds).toPrecision(5))),
         onReset: () => setRange(null, null), onSize: trace,
       }));
       fill(plots, traces);

@@ -57,7 +57,7 @@ export const panel = {
     let result = null;
     /** @type {any} */
     let draft = null;
-    /** @type {api.Job | null} */
+    /** @type {import("./api.js").Job | null} */
     let finished = null;
     let asked = "";
     /** What a person holds, by axis and parameter, with its unit. @type {Map<string, string>} */

@@ -150,8 +150,9 @@ export function slider(keys) {
     if (!interval) return;
     const from = Math.max(0, low === null ? 0 : share(low));
     const to = Math.min(1, high === null ? 1 : share(high));
-    band.style.left = `${100 * from}%`;
-    band.style.width = `${100 * Math.max(0.004, to - from)}%`;
+    // the thumb's middle goes from half its width to as much before the end
+    band.style.left = `calc(8px + ${from} * (100% - 16px))`;
+    band.style.width = `calc(2px + ${Math.max(0, to - from)} * (100% - 16px))`;
     band.title = `95 % interval: ${low === null ? "open" : number(low)} to ${high === null ? "open" : number(high)} ${unit}`;
   };
   range.addEventListener("input", () => {

@@ -78,9 +78,9 @@ export const panel = {
     const from = textField("From, s", { placeholder: "start", size: 9, onchange: () => typed() });
     const to = textField("To, s", { placeholder: "end", size: 9, onchange: () => typed() });
     const calm = button("", () => {}, { className: "main", hidden: true });
-    const zoom = button("Zoom to the range", () => look(range()));
-    const whole = button("See the whole log", () => look(null));
-    const clear = button("Use the whole log", () => setRange(null, null));
+    const zoom = button("Zoom to it", () => look(range()));
+    const whole = button("Zoom out", () => look(null));
+    const clear = button("Take all of it", () => setRange(null, null));
     const next = button("Identify its noise", () => ctx.open("noise", { axis: 0 }), { className: "main" });
     const findings = el("section");
     const plots = el("div");
@@ -272,8 +272,8 @@ export const panel = {
       facts.textContent = `${check.samples} samples, ${number(hz)} Hz, ${duration(seconds)}, ${axes.length} ${axes.length === 1 ? "axis" : "axes"} in ${shown}`;
       announce(facts.textContent);
       chosen.hidden = false;
-      traces = axes.slice(0, MOST_AXES).map((/** @type {string} */ name) => figure({
-        title: name, x: "time from the start (s)", y: shown, height: 190, sync: "log", legend: false,
+      traces = axes.slice(0, MOST_AXES).map((/** @type {string} */ name, /** @type {number} */ i, /** @type {string[]} */ all) => figure({
+        title: name, x: "time from the start (s)", bare: i + 1 < all.length, y: shown, height: i + 1 < all.length ? 150 : 170, sync: "log", legend: false,
         onRange: (a, b) => setRange(Math.max(0, Number(a.toPrecision(5))), Number(Math.min(b, seconds).toPrecision(5))),
         onReset: () => setRange(null, null), onSize: trace,
       }));

@@ -4,7 +4,7 @@ import { reading } from "./panel_log.js";
 import { figure } from "./plot.js";
 import * as state from "./state.js";
 import {
-  button, details, el, exportMenu, fill, jobView, measured, number, selectField, slider, table, textField,
+  button, details, el, exportMenu, fill, jobView, measured, number, selectField, slider, table, textField, unitText,
 } from "./ui.js";
 
 /** What terms are called, and by which letter. @type {Record<string, string>} */
@@ -220,7 +220,7 @@ export const panel = {
       if (!list.length) return fill(candidates);
       fill(candidates, el("h2", null, "Candidates"), table({
         caption: "The lowest score wins; held-out is ln L of the last third under the parameters of the first two.",
-        head: ["Model", "Parameters", "Score", "ln L", "Held-out", "Every parameter known", ""],
+        head: ["Model", "Parameters", "Score above the best", "ln L", "Held-out", "Every parameter known", ""],
         rows: list.map((/** @type {any} */ it) => [
           it.chosen ? el("strong", null, it.model) : it.model, it.parameters, number(it.score - list[0].score, 4), number(it.log_likelihood, 9), number(it.held_out, 8),
           it.identified ? "yes" : "no", it.chosen ? "chosen" : button("Use", () => { held.clear(); again({ model: it.model, hold: null }); }, { "aria-label": `Use ${it.model}` })]),
@@ -238,7 +238,7 @@ export const panel = {
         rows: [...(own.bias ? [["Bias", number(own.bias.value), own.bias.unit, ends(own.bias), "", ""]] : []),
           ...parameters(result.params.axes[at()]).map((it) => {
             const p = precise.get(it.id);
-            return [it.name, number(it.value.value), it.value.unit, ends(it.value), p?.std_dev_percent ? `${number(p.std_dev_percent, 3)} %` : "–", p?.cramer_rao_percent ? `${number(p.cramer_rao_percent, 3)} %` : "–"];
+            return [it.name, number(it.value.value), unitText(it.value.unit), ends(it.value), p?.std_dev_percent ? `${number(p.std_dev_percent, 3)} %` : "–", p?.cramer_rao_percent ? `${number(p.cramer_rao_percent, 3)} %` : "–"];
           })] }),
       el("p", null, found?.fit_p_value === undefined || found.fit_p_value === null ? null : `Fit: p ${number(found.fit_p_value, 2)}. `),
       temperature ? el("p", null, `Temperature: ${measured(temperature.coefficient)}, over ${measured(temperature.span)} about ${measured(temperature.reference)}. `) : null,
@@ -275,7 +275,7 @@ export const panel = {
     /** A handle stands where its term says most; that of a hump on its top.
      * @param {Awaited<ReturnType<typeof api.curve>>} it @param {any} points */
     function handles(it, points) {
-      plot.setAxis(it.unit);
+      plot.setAxis(`σ (${it.unit})`);
       spectrum.setAxis(`${it.unit}/√Hz`);
       const own = parameters(draft.axes[at()]);
       const last = it.times.findIndex((t) => t > points.tau_s[points.tau_s.length - 1]);
@@ -297,7 +297,7 @@ export const panel = {
         const here = { x: it.times[i], y: term.deviation[i] };
         return [{
           name: TERMS[term.name] + (nth.get(term.name) === 1 ? "" : ` ${at + 1}`), ...here, unit: it.unit, sideways: hump && !!time,
-          text: [amount, ...(hump && time ? [time] : [])].map((p) => `${number(p.value.value)} ${p.value.unit}${beyond(p) ? ", outside the 95 % interval" : ""}`).join(", "),
+          text: [amount, ...(hump && time ? [time] : [])].map((p) => `${number(p.value.value)} ${unitText(p.value.unit)}${beyond(p) ? ", outside the 95 % interval" : ""}`).join(", "),
           onMove: (/** @type {{x: number, y: number}} */ to) => {
             dragged = amount.id;
             // the curve answers later: the next move starts from this one

@@ -16,7 +16,8 @@ const UPlot = /** @type {any} */ (window).uPlot;
  *   onMove: (to: {x: number, y: number}) => void, onDone?: () => void}} Handle
  * @typedef {{title: string, x: string, y: string, xLog?: boolean, yLog?: boolean, height?: number, sync?: string,
  *   xRange?: [number, number] | null, yRange?: [number, number] | null, onRange?: (from: number, to: number) => void,
- *   onReset?: () => void, onSize?: (pixels: number) => void, legend?: boolean}} Keys
+ *   onReset?: () => void, onSize?: (pixels: number) => void, legend?: boolean, bare?: boolean}} Keys
+ * `bare`: the axis below has no words, for one more figure stands under it
  */
 
 /** Beside colours, so that a line is known without them. */
@@ -185,9 +186,9 @@ export function figure(keys) {
   function build() {
     u?.destroy();
     const font = `12px ${getComputedStyle(document.body).fontFamily}`;
-    /** @param {string} label @param {boolean} log @param {boolean} upright */
+    /** @param {string | undefined} label @param {boolean} log @param {boolean} upright */
     const axis = (label, log, upright) => ({
-      label, font, labelFont: font, stroke: () => colour(0), size: upright ? 64 : 40, labelSize: 20,
+      label, font, labelFont: font, stroke: () => colour(0), size: upright ? 58 : 30, labelSize: 20, labelGap: 0, ...(upright ? { space: 24 } : {}),
       grid: { stroke: ruled, width: 1 }, ticks: { stroke: ruled, width: 1, size: 4 },
       values: log ? decades : (/** @type {any} */ _u, /** @type {number[]} */ v) => v.map(short),
       ...(log ? { filter: (/** @type {any} */ _u, /** @type {any} */ s) => s } : {}),
@@ -198,7 +199,7 @@ export function figure(keys) {
         x: { time: false, distr: keys.xLog ? 3 : 1, range: () => xRange() },
         y: { distr: keys.yLog ? 3 : 1, range: () => yRange() },
       },
-      axes: [axis(keys.x, !!keys.xLog, false), axis(keys.y, !!keys.yLog, true)],
+      axes: [axis(keys.bare ? undefined : keys.x, !!keys.xLog, false), axis(keys.y, !!keys.yLog, true)],
       cursor: {
         drag: { x: !!keys.onRange, y: false, setScale: false },
         sync: keys.sync ? { key: keys.sync } : undefined,

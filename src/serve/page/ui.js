@@ -51,8 +51,11 @@ export function duration(seconds) {
 export const size = (bytes) =>
   bytes < 1e3 ? `${bytes} B` : bytes < 1e6 ? `${number(bytes / 1e3, 3)} kB` : `${number(bytes / 1e6, 3)} MB`;
 
+/** A unit as it is printed: √Hz, m/s². @param {string} text */
+export const unitText = (text) => text.replace(/sqrt\((\w+)\)/g, "√$1").replace("^2", "²");
+
 /** A value with its unit, as documents hold it. @param {any} measured @param {number} [digits] */
-export const measured = (measured, digits) => (measured ? `${number(measured.value, digits)} ${measured.unit}` : "–");
+export const measured = (measured, digits) => (measured ? `${number(measured.value, digits)} ${unitText(measured.unit)}` : "–");
 
 // ---------------------------------------------------------------------------------------------- what is announced
 
@@ -122,7 +125,8 @@ const STEPS = 1000;
  *   locked?: boolean, onInput?: (value: number) => void, onChange?: (value: number) => void,
  *   onLock?: (locked: boolean) => void}} keys */
 export function slider(keys) {
-  const { label, unit, interval } = keys;
+  const { label, interval } = keys;
+  const unit = unitText(keys.unit);
   let { value, min, max } = keys;
   const log = min > 0;
   /** @param {number} v */
@@ -183,7 +187,7 @@ export function slider(keys) {
   const root = el("div", { className: "slider" },
     el("span", { className: "name", id: name }, label),
     el("span", { className: "amount" }, box, el("span", { className: "unit" }, unit)),
-    el("span", { className: "track" }, band, range),
+    el("span", { className: lock ? "track" : "track alone" }, band, range),
     lock && el("label", { className: "lock" }, lock, "hold"),
     note);
   return Object.assign(root, {

@@ -67,7 +67,7 @@ export const panel = {
     function names(all) {
       fill(list, el("h2", null, "Pinned designs"), all.length ? null : el("p", null, "None yet. ", button("Make one in Design", () => ctx.open("design"))),
         el("ul", { className: "files" }, all.map((it, at) => {
-          const name = el("input", { type: "text", value: it.name, "aria-label": `name of ${it.name}`, size: 18, onchange: () => {
+          const name = el("input", { type: "text", value: it.name, "aria-label": `name of ${it.name}`, size: 11, onchange: () => {
             const next = name.value.trim().replaceAll("|", " ");
             if (!next || all.some((other) => other !== it && other.name === next)) {
               name.value = it.name;

@@ -103,7 +103,8 @@ export const panel = {
     const axis = selectField("Axis", [], { onchange: (value) => { state.set({ axis: value }, true); sliders(); draw(); } });
     const knobs = el("div");
     const reset = button("Back to the identified numbers", () => change({ x: null }));
-    const job = jobView({ brief: true });
+    const job = jobView();
+    const brief = el("section");
     const problem = el("p", { className: "error", role: "alert", hidden: true });
     const which = selectField("State", [], { onchange: (value) => { state.set({ state: value }, true); draw(); } });
     const plot = figure({ title: "Predicted standard deviation σ(t)", x: "time (s)", y: "", xLog: true, yLog: true, height: 360 });
@@ -113,7 +114,7 @@ export const panel = {
     const insight = el("section");
     const more = checkField("Also say what other parts would buy", false);
     const verify = button("Verify by simulated runs", () => check(), { className: "main" });
-    const pinName = textField("Name", { size: 14 });
+    const pinName = textField("Name of the pin", { size: 14 });
     const pinned = button("Pin for Compare", keep);
     const out = el("div");
     fill(root,
@@ -123,7 +124,7 @@ export const panel = {
         el("section", null, el("h2", null, "Parameters"), axis, knobs, el("div", { className: "row" }, reset)),
         el("section", null, el("div", { className: "row" }, verify), more, job, out),
         el("section", null, el("div", { className: "row" }, pinName, pinned))),
-      el("div", { className: "figures" }, problem, which, plot, shares, steady, insight, notes));
+      el("div", { className: "figures" }, problem, brief, which, plot, shares, steady, insight, notes));
 
     /** @param {Record<string, any>} values */
     function change(values) {
@@ -276,7 +277,12 @@ export const panel = {
       const key = JSON.stringify([loaded, now.plant.plant, aids, state.get("motion"), state.get("accelerometer")]);
       const plain = words() === "";
       preview({ request: now, draft: draft(), key, plain });
-      verify.textContent = "Verify by simulated runs";
+      if (verified) {
+        // what was verified is another design
+        verified = null;
+        job.clear();
+        [out, brief, insight].forEach((part) => fill(part));
+      }
     }
 
     function draw() {
@@ -299,8 +305,7 @@ export const panel = {
 
     async function check() {
       if (!params) return;
-      fill(out);
-      fill(insight);
+      [out, brief, insight].forEach((part) => fill(part));
       verified = null;
       try {
         const done = await api.run("tune", { ...request(), ...(more.input.checked ? { insight: true } : {}) }, { drafts: { "params.json": draft() }, onJob: job.update });
@@ -308,6 +313,7 @@ export const panel = {
         verified = done;
         shown = results(document);
         draw();
+        fill(brief, el("h2", null, `Verified: ${done.verdict ?? document.verification?.verdict ?? ""}`), el("pre", { tabIndex: 0 }, done.brief ?? ""));
         fill(out, exportMenu(done, { stem: "filter", file: "filter.json", onSave: () => ctx.refresh(), readOnly: ctx.project.read_only }));
         if (document.insight) showInsight(document.insight);
       } catch (error) {

@@ -21,6 +21,8 @@ const AMOUNTS = ["density", "coefficient", "slope", "std_dev"];
 const REACH = 8;
 const METHODS = [["likelihood", "maximum likelihood"], ["allan", "fit of the Allan curve"], ["gmwm", "wavelet moments (GMWM)"], ["graphical", "graphical"]];
 const DEVIATION_POINTS = 160;
+/** Between the last key and a refit, ms: longer than the repetition of a key that is held down. */
+const KEYS_PAUSE = 350;
 
 /** @typedef {{id: string, term: string, at: number, field: string, name: string, value: any}} Parameter
  * `id` as `hold` names it, `value` the document's own `{value, unit, interval}` */
@@ -60,6 +62,9 @@ export const panel = {
     /** @type {import("./api.js").Job | null} */
     let finished = null;
     let asked = "";
+    /** Under way. */
+    let running = 0;
+    let pause = 0;
     /** What a person holds, by axis and parameter, with its unit. @type {Map<string, string>} */
     let held = new Map();
 
@@ -124,14 +129,19 @@ export const panel = {
       if (key === asked) return;
       asked = key;
       try {
-        const done = await api.run("identify", now, { onJob: (it) => asked === key && job.update(it) });
+        // nobody waits for the one before
+        if (running) api.stop(running).catch(() => {});
+        const done = await api.run("identify", now, { onJob: (it) => { if (asked === key) { running = it.id; job.update(it); } } });
         const document = await api.document_(done.id);
         if (asked !== key) return;
+        running = 0;
         [finished, result] = [done, document];
         kept(FOUND, result.params);
         showResult();
       } catch (error) {
-        if (asked === key) job.fail(/** @type {Error} */ (error));
+        if (asked !== key) return;
+        running = 0;
+        job.fail(/** @type {Error} */ (error));
       }
     }
 
@@ -157,6 +167,8 @@ export const panel = {
       axis.input.value = `${at()}`;
       const own = draft.axes[at()];
       const found = result.axes[at()];
+      const focus = [...rows].flatMap(([id, row]) => /** @type {const} */ (["range", "box", "lock"]).filter((part) => row[part] === document.activeElement).map((part) => ({ id, part })))[0];
+      rows.clear();
       const all = parameters(own);
       const holds = found?.hold?.parameters ?? [];
       fill(sliders, all.map((it) => {
@@ -168,7 +180,7 @@ export const panel = {
         const row = slider({
           label: it.name, unit: it.value.unit, value: it.value.value, interval,
           min: Math.min(middle, it.value.value) / REACH, max: Math.max(middle, it.value.value) * REACH, locked: held.has(id),
-          onInput: (value) => { it.value.value = value; rows.get(it.id)?.lock?.toggleAttribute("checked", true); moved(it); },
+          onInput: (value) => { it.value.value = value; moved(it); },
           onChange: () => hold(it),
           onLock: (locked) => { if (locked) hold(it); else { held.delete(id); refit(); } },
         });
@@ -176,6 +188,7 @@ export const panel = {
         return row;
       }));
       if (!all.length) fill(sliders, el("p", { className: "hint" }, "Nothing of this axis was identified."));
+      if (focus) rows.get(focus.id)?.[focus.part]?.focus();
       free.hidden = held.size === 0;
       showCost(found);
       showCandidates(found);
@@ -190,6 +203,9 @@ export const panel = {
     function moved(it) {
       const row = rows.get(it.id);
       if (row?.lock) row.lock.checked = true;
+      // what is under way knows nothing of this
+      asked = "";
+      clearTimeout(pause);
       ask();
     }
 
@@ -200,8 +216,12 @@ export const panel = {
     }
 
     function refit() {
-      state.set({ hold: [...held].map(([id, value]) => `${id}=${value}`).join(";") }, true);
-      identify();
+      // keys come one by one, and each is a change
+      clearTimeout(pause);
+      pause = window.setTimeout(() => {
+        state.set({ hold: [...held].map(([id, value]) => `${id}=${value}`).join(";") }, true);
+        identify();
+      }, KEYS_PAUSE);
     }
 
     /** @param {any} found */
@@ -257,7 +277,7 @@ export const panel = {
       const thin = it.terms.map((term, i) => ({ name: TERMS[term.name] ?? term.name, x: it.times, y: term.deviation, colour: 2 + (i % 5), dash: 1 + (i % 5), width: 1, faint: true }));
       plot.set([
         { name: "log, 95 % bars", x: points.tau_s, y: points.deviation, low: points.lower, high: points.upper, kind: "points" },
-        { name: held.size ? "model, as held" : "model", x: it.times, y: it.deviation, colour: 1, width: 2 },
+        { name: "model", x: it.times, y: it.deviation, colour: 1, width: 2 },
         ...thin,
       ]);
       const under = it.terms.map((term, i) => ({ name: TERMS[term.name] ?? term.name, x: it.frequencies, y: term.density, colour: 2 + (i % 5), dash: 1 + (i % 5), width: 1, faint: true }));

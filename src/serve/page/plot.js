@@ -184,6 +184,7 @@ export function figure(keys) {
   const height = () => keys.height ?? 320;
 
   function build() {
+    const held = document.activeElement;
     u?.destroy();
     const font = `12px ${getComputedStyle(document.body).fontFamily}`;
     /** @param {string | undefined} label @param {boolean} log @param {boolean} upright */
@@ -226,6 +227,7 @@ export function figure(keys) {
     u.over.addEventListener("dblclick", () => keys.onReset?.());
     handles.forEach((handle) => u.over.append(handle.node));
     settle();
+    if (held instanceof HTMLElement && held !== document.activeElement && root.contains(held)) held.focus();
   }
 
   /** What the cursor stands on. @param {any} u */

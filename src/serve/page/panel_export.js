@@ -1,6 +1,7 @@
 // Numbers for other programs, a filter as source code, and the reports of what was done here.
 
 import * as api from "./api.js";
+import { filesOf } from "./panel_replay.js";
 import * as state from "./state.js";
 import {
   button,
@@ -58,7 +59,7 @@ export const panel = {
     /** @param {string} key */
     const own = (key) => state.get(`export.${key}`);
     /** @param {string} kind */
-    const names = (kind) => ctx.project.files.filter((file) => file.kind === kind).map(({ name }) => name);
+    const names = (kind) => filesOf(ctx, kind);
     const to = selectField("For", [...PROGRAMS, ...CODE], {
       value: own("to"),
       onchange: (to) => {
@@ -170,13 +171,7 @@ export const panel = {
         const all = await api.document_(done.id, "files");
         fill(
           files,
-          all.map(([path, text]) =>
-            show(
-              path ??
-                `${stem}-${to.input.value}.${ENDINGS[to.input.value]}`,
-              text,
-            ),
-          ),
+          all.map(([path, text]) => show(path ?? `${stem}-${to.input.value}.${ENDINGS[to.input.value]}`, text)),
         );
       } catch (error) {
         job.fail(/** @type {Error} */ (error));

@@ -18,6 +18,7 @@ import {
   table,
   textField,
 } from "./ui.js";
+import { filesOf, heading, testTable } from "./panel_replay.js";
 import { figure } from "./plot.js";
 
 /** @typedef {ReturnType<typeof figure>} Figure */
@@ -39,7 +40,7 @@ export const panel = {
     /** @param {string} key */
     const own = (key) => state.get(`gate.${key}`);
     /** @param {string} kind */
-    const names = (kind) => ctx.project.files.filter((file) => file.kind === kind).map(({ name }) => name);
+    const names = (kind) => filesOf(ctx, kind);
     const filter = selectField("Filter", [], { onchange: (name) => state.set({ "gate.filter": name }) });
     const truth = selectField("Truth", [], {
       hint: "what is simulated",
@@ -145,33 +146,20 @@ export const panel = {
       drawn.forEach((old) => old.destroy());
       drawn = [];
       fill(more, exportMenu(done, { stem: "montecarlo", readOnly: ctx.project.read_only }));
-      const good = result.verdict === "consistent";
       announce(`${result.verdict}: ${result.meaning}`);
       const rate = result.false_alarm_rate;
       const seed = result.seed;
-      const tests = [...result.tests].sort((a, b) => Number(a.pass) - Number(b.pass));
       const detects = result.detects ?? [];
       fill(
         results,
-        el("h2", null, el("span", { className: good ? "good" : "bad" }, result.verdict), `: ${result.meaning}`),
+        heading(result),
         el(
           "p",
           null,
           `Runs ${result.runs.first} to ${result.runs.end - 1}, ${duration(result.duration_s)} each, seed ${seed}.`,
           rate ? ` A true filter fails this gate with probability ${number(100 * rate.value, 3)} %.` : "",
         ),
-        table({
-          caption: "Tests; p over all tests together",
-          head: ["axis", "what", "statistic", "expected", "p", "result"],
-          rows: tests.map((it) => [
-            it.axis,
-            it.meaning,
-            number(it.statistic),
-            `${number(it.lower)} to ${number(it.upper)}`,
-            number(it.adjusted_p_value, 3),
-            it.pass ? "pass" : el("span", { className: "bad" }, "FAIL"),
-          ]),
-        }),
+        testTable(result.tests),
         detects.length
           ? details(
               "What this gate sees with 90 % probability",
@@ -189,7 +177,7 @@ export const panel = {
           : null,
       );
       for (const axis of result.axes) {
-        const section = el("section", null, el("h3", null, `Axis ${axis.name}`));
+        const section = el("section", { className: "pair" });
         results.append(section);
         const { time_s: all, mean, expected, lower, upper } = axis.nees;
         // a logarithmic axis has no zero

@@ -17,6 +17,7 @@ import {
   slider,
   table,
 } from "./ui.js";
+import { filesOf } from "./panel_replay.js";
 import { figure } from "./plot.js";
 
 /**
@@ -51,6 +52,9 @@ function amount(it) {
 }
 /** @param {Amount} it */
 const written = ({ value, unit }) => (unit ? `${state.digits4(value)} ${unit}` : Number(state.digits4(value)));
+
+/** What is nothing but rounding is zero. @param {number | undefined} value */
+const settled = (value) => (value !== undefined && Math.abs(value) < 1e-9 ? 0 : value);
 
 /** A path that a file names, from the folder. @param {string} file @param {string} path */
 function resolved(file, path) {
@@ -292,7 +296,7 @@ export const panel = {
   show(root, ctx) {
     /** @param {string} key */
     const own = (key) => state.get(`loop.${key}`);
-    const names = () => ctx.project.files.filter(({ kind }) => kind === "flight").map(({ name }) => name);
+    const names = () => filesOf(ctx, "flight");
     const chosen = selectField("Flight", [], {
       onchange: (name) => {
         state.set({ "loop.flight": name, ...Object.fromEntries(moved.map(({ key }) => [`loop.${key}`, null])) }, true);
@@ -310,8 +314,8 @@ export const panel = {
     );
     const verdict = el("h2");
     const tables = el("div");
-    const maps = el("div");
-    const curves = el("div");
+    const maps = el("div", { className: "pair" });
+    const curves = el("div", { className: "pair" });
     fill(
       root,
       el("div", { className: "controls" }, el("h2", null, "Loop"), empty, chosen, sliders, keep, job, more),
@@ -445,8 +449,8 @@ export const panel = {
                   3,
                 ),
                 ...HALVES.map(([half]) => number(feed[half].least_damped?.damping, 3)),
-                number(feed.pitch.offset?.theta, 3),
-                number(feed.roll_yaw.offset?.phi, 3),
+                number(settled(feed.pitch.offset?.theta), 3),
+                number(settled(feed.roll_yaw.offset?.phi), 3),
               ]
             : ["unstable", "–", "–", "–", "–"]),
           failed(feed.name) ? el("span", { className: "bad" }, `FAIL: ${failed(feed.name)}`) : "pass",

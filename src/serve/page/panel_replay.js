@@ -16,6 +16,7 @@ import {
   table,
   textField,
 } from "./ui.js";
+import { reading as logReading } from "./panel_log.js";
 import { figure } from "./plot.js";
 
 /**
@@ -46,6 +47,34 @@ const READING = [
 /** Innovations over their sigma leave ±3 once in 370 samples. */
 const BOUND = 3;
 
+/** Files of these kinds, those of the folder itself first. @param {import("./app.js").Context} ctx
+ * @param {...string} kinds */
+export function filesOf(ctx, ...kinds) {
+  const all = ctx.project.files.filter(({ kind }) => kinds.includes(kind)).map(({ name }) => name);
+  return all.sort((a, b) => a.split("/").length - b.split("/").length);
+}
+
+/** A verdict with what it means. @param {{verdict: string, meaning: string}} it */
+export const heading = ({ verdict, meaning }) => [
+  el("h2", { className: verdict === "consistent" ? "good" : "bad" }, verdict),
+  el("p", null, meaning),
+];
+
+/** Failed ones first. @param {Test[]} tests @param {(test: Test) => void} [where] shows what a failed one is about */
+export function testTable(tests, where) {
+  const rows = [...tests]
+    .sort((a, b) => Number(a.pass) - Number(b.pass))
+    .map((it) => {
+      const what = `${it.axis}: ${it.meaning}`;
+      const show = where && button("Where", () => where(it), { "aria-label": `Where: ${what}` });
+      const result = it.pass ? "pass" : el("span", { className: "bad" }, "FAIL ", show);
+      const expected = `${number(it.lower)} to ${number(it.upper)}`;
+      return [what, number(it.statistic), expected, number(it.adjusted_p_value, 3), result];
+    });
+  const head = ["test", "statistic", "expected", "p", "result"];
+  return rows.length ? table({ caption: "Tests; p over all tests together", head, rows }) : el("p", null, "No test.");
+}
+
 /** @type {import("./app.js").Panel} */
 export const panel = {
   id: "replay",
@@ -54,7 +83,7 @@ export const panel = {
     /** @param {string} key */
     const own = (key) => state.get(`replay.${key}`);
     /** @param {...string} kinds */
-    const names = (...kinds) => ctx.project.files.filter(({ kind }) => kinds.includes(kind)).map(({ name }) => name);
+    const names = (...kinds) => filesOf(ctx, ...kinds);
     const filter = selectField("Filter", [], { onchange: (name) => state.set({ "replay.filter": name }) });
     const log = selectField("Log", [], { onchange: (name) => state.set({ "replay.log": name }) });
     const form = selectField(
@@ -67,19 +96,14 @@ export const panel = {
       { value: own("form") || "joseph" },
     );
     /** What the Log panel knows of the same log. @type {Record<string, any>} */
-    let known = {};
-    try {
-      known = state.get("log") === (own("log") || state.get("log")) ? JSON.parse(state.get("reading", "{}")) : {};
-    } catch {
-      /* typed by hand */
-    }
+    const known = !own("log") || own("log") === state.get("log") ? logReading(true) : {};
     /** @param {[string, string, string][]} all */
     const texts = (all) =>
       all.map(([key, label, hint]) => ({
         key,
         it: textField(label, {
           hint,
-          value: own(key) || (known[key] === undefined || known[key] === null ? "" : `${known[key]}`),
+          value: own(key) || `${known[key] ?? ""}`,
         }),
       }));
     const options = texts(TEXTS);
@@ -88,10 +112,10 @@ export const panel = {
     const job = jobView({ brief: true });
     const start = button("Replay", () => run(), { className: "main" });
     const more = el("div");
-    const verdict = el("h2", { "aria-live": "polite" });
+    const verdict = el("div", { "aria-live": "polite" });
     const tests = el("div");
     const axes = selectField("Axis", []);
-    const charts = el("div");
+    const charts = el("div", { className: "pair" });
     const shown = el("p", { className: "hint" });
     const figures = el(
       "div",
@@ -198,13 +222,9 @@ export const panel = {
       job.update(done);
       const result = await api.document_(done.id);
       fill(more, exportMenu(done, { stem: "replay", readOnly: ctx.project.read_only }));
-      fill(
-        verdict,
-        el("span", { className: result.verdict === "consistent" ? "good" : "bad" }, result.verdict),
-        `: ${result.meaning}`,
-      );
+      fill(verdict, heading(result));
       curves = done.has.includes("curves") ? (await api.document_(done.id, "curves")).axes : [];
-      listTests(result.tests ?? []);
+      fill(tests, testTable(result.tests ?? [], curves.length ? where : undefined));
       axes.hidden = curves.length < 2;
       axes.set(
         curves.map(({ name }) => name),
@@ -213,39 +233,6 @@ export const panel = {
       const [from, to] = [state.number("replay.from"), state.number("replay.to")];
       range = from === undefined || to === undefined ? null : [from, to];
       draw();
-    }
-
-    /** @param {Test[]} all */
-    function listTests(all) {
-      const rows = [...all]
-        .sort((a, b) => Number(a.pass) - Number(b.pass))
-        .map((test) => [
-          test.axis,
-          test.meaning,
-          number(test.statistic),
-          `${number(test.lower)} to ${number(test.upper)}`,
-          number(test.adjusted_p_value, 3),
-          test.pass
-            ? "pass"
-            : el(
-                "span",
-                { className: "bad" },
-                "FAIL ",
-                curves.length
-                  ? button("Where", () => where(test), { "aria-label": `Where: ${test.axis}, ${test.meaning}` })
-                  : null,
-              ),
-        ]);
-      fill(
-        tests,
-        rows.length
-          ? table({
-              caption: "Tests of the innovations; p over all tests together",
-              head: ["axis", "what", "statistic", "expected", "p", "result"],
-              rows,
-            })
-          : null,
-      );
     }
 
     /** To the stretch that says most against the filter: the start, or where averaged innovations are largest.
@@ -311,6 +298,14 @@ export const panel = {
       const many = axis.samples_per_point > 1;
       inTime(`${axis.name}: estimate`, unit, [
         {
+          name: many ? `log, mean of ${axis.samples_per_point} samples` : "log",
+          x,
+          y: trace.measured,
+          faint: true,
+          colour: 3,
+          dash: 2,
+        },
+        {
           name: "± 3 sigma",
           x,
           y: trace.estimate,
@@ -320,14 +315,6 @@ export const panel = {
           colour: 1,
         },
         { name: "estimate", x, y: trace.estimate, colour: 1, width: 2 },
-        {
-          name: many ? `log, mean of ${axis.samples_per_point} samples` : "log",
-          x,
-          y: trace.measured,
-          faint: true,
-          colour: 3,
-          dash: 2,
-        },
       ]);
       const bounds = [BOUND, -BOUND].map((v) => ({
         name: `${v > 0 ? "+" : "−"}${BOUND}`,

@@ -144,7 +144,8 @@ export async function series(log, what, signal) {
 }
 
 /** @param {string} name @param {Blob} content */
-export const upload = (name, content) => ask(`api/upload/${encodeURIComponent(name)}`, { method: "PUT", body: content });
+export const upload = (name, content) =>
+  ask(`api/upload/${encodeURIComponent(name)}`, { method: "PUT", body: content });
 
 /** @param {{name: string, document?: any, text?: string, replace?: boolean}} what @returns {Promise<{name: string}>} */
 export const save = async (what) => (await post("api/save", what)).json();

@@ -27,7 +27,11 @@ const shown = new Map();
 
 /** @type {Context} */
 const ctx = {
-  api, state, open, refresh, tour,
+  api,
+  state,
+  open,
+  refresh,
+  tour,
   project: { version: "", folder: "", read_only: false, files: [], jobs: [] },
 };
 
@@ -70,8 +74,12 @@ function show() {
 }
 
 function tabs() {
-  fill(place("tabs"), panels.map(({ id, title }) =>
-    el("button", { type: "button", role: "tab", id: `tab-${id}`, tabIndex: -1, onclick: () => open(id) }, title)));
+  fill(
+    place("tabs"),
+    panels.map(({ id, title }) =>
+      el("button", { type: "button", role: "tab", id: `tab-${id}`, tabIndex: -1, onclick: () => open(id) }, title),
+    ),
+  );
   place("tabs").addEventListener("keydown", (e) => {
     const at = panels.findIndex(({ id }) => document.activeElement?.id === `tab-${id}`);
     const n = panels.length;
@@ -89,25 +97,55 @@ function tabs() {
 
 /** @type {[string, string][]} */
 const STEPS = [
-  ["log", "Log: pick a log of the sensor at rest. What the check finds is marked in the trace. Drag over the calm part, or take the one that is offered."],
-  ["noise", "Noise: Allan deviations with 95 % bars, the fitted model and each of its terms. Move a term by its handle or its slider; let go with others unlocked and they are found anew."],
-  ["design", "Design: choose plant and aids. The sliders stand on the identified numbers, the interval is drawn above each. σ(t) and the error budget follow; Verify simulates runs."],
+  [
+    "log",
+    "Log: pick a log of the sensor at rest. What the check finds is marked in the trace. Drag over the calm part, or take the one that is offered.",
+  ],
+  [
+    "noise",
+    "Noise: Allan deviations with 95 % bars, the fitted model and each of its terms. Move a term by its handle or its slider; let go with others unlocked and they are found anew.",
+  ],
+  [
+    "design",
+    "Design: choose plant and aids. The sliders stand on the identified numbers, the interval is drawn above each. σ(t) and the error budget follow; Verify simulates runs.",
+  ],
   ["compare", "Compare: pin up to six designs and see them in the same axes."],
   ["replay", "Replay: a recorded log through the filter, with tests of its innovations."],
-  ["gate", "Gate: many simulated runs. Does the covariance tell the truth? The verdict comes when all planned runs are done."],
-  ["export", "Export: the numbers for other programs, or the filter as C or Rust. Each panel shows the command that does the same."],
+  [
+    "gate",
+    "Gate: many simulated runs. Does the covariance tell the truth? The verdict comes when all planned runs are done.",
+  ],
+  [
+    "export",
+    "Export: the numbers for other programs, or the filter as C or Rust. Each panel shows the command that does the same.",
+  ],
 ];
 
 /** @param {number} [at] */
 function tour(at = 0) {
   const step = STEPS[at];
-  const end = () => { fill(place("tour")); place(`tab-${state.get("panel", log.id)}`).focus(); };
+  const end = () => {
+    fill(place("tour"));
+    place(`tab-${state.get("panel", log.id)}`).focus();
+  };
   if (!step) return end();
   open(step[0]);
   const next = button(at + 1 < STEPS.length ? "Next" : "Done", () => tour(at + 1), { className: "main" });
-  fill(place("tour"), el("section", { "aria-label": "Tour", onkeydown: (/** @type {KeyboardEvent} */ e) => e.key === "Escape" && end() },
-    el("p", null, step[1]),
-    el("div", { className: "row" }, next, button("End the tour", end), el("span", { className: "hint" }, `${at + 1} of ${STEPS.length}`))));
+  fill(
+    place("tour"),
+    el(
+      "section",
+      { "aria-label": "Tour", onkeydown: (/** @type {KeyboardEvent} */ e) => e.key === "Escape" && end() },
+      el("p", null, step[1]),
+      el(
+        "div",
+        { className: "row" },
+        next,
+        button("End the tour", end),
+        el("span", { className: "hint" }, `${at + 1} of ${STEPS.length}`),
+      ),
+    ),
+  );
   next.focus();
 }
 
@@ -115,8 +153,15 @@ function tour(at = 0) {
 
 /** @param {Event} event */
 const carries = (event) => /** @type {DragEvent} */ (event).dataTransfer?.types.includes("Files");
-addEventListener("dragover", (e) => { if (carries(e)) { e.preventDefault(); document.body.classList.add("drop"); } });
-addEventListener("dragleave", (e) => { if (!e.relatedTarget) document.body.classList.remove("drop"); });
+addEventListener("dragover", (e) => {
+  if (carries(e)) {
+    e.preventDefault();
+    document.body.classList.add("drop");
+  }
+});
+addEventListener("dragleave", (e) => {
+  if (!e.relatedTarget) document.body.classList.remove("drop");
+});
 addEventListener("drop", async (e) => {
   document.body.classList.remove("drop");
   if (!carries(e)) return;
@@ -130,7 +175,12 @@ addEventListener("drop", async (e) => {
       if (kind === "log") open("log", { log: file.name, from: null, to: null });
       announce(`${file.name} is in the folder`);
     } catch (error) {
-      fill(place("alert"), /** @type {Error} */ (error).message, " ", button("Close", () => fill(place("alert"))));
+      fill(
+        place("alert"),
+        /** @type {Error} */ (error).message,
+        " ",
+        button("Close", () => fill(place("alert"))),
+      );
     }
   }
 });
@@ -140,11 +190,16 @@ api.onServer.add((now) => {
   if (now === there) return;
   there = now;
   if (now) return fill(place("alert"));
-  fill(place("alert"), "The server does not answer. What you set here is kept. Start kfdesign serve again, or ",
-    button("try again", () => refresh().catch(() => announce("still no answer"))));
+  fill(
+    place("alert"),
+    "The server does not answer. What you set here is kept. Start kfdesign serve again, or ",
+    button("try again", () => refresh().catch(() => announce("still no answer"))),
+  );
 });
 
 tabs();
 state.onChange(show);
 addEventListener("focus", () => refresh().catch(() => {}));
-refresh().catch(() => {}).then(show);
+refresh()
+  .catch(() => {})
+  .then(show);

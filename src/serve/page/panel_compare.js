@@ -45,49 +45,110 @@ export const panel = {
     /** What Delete took away. @type {{pin: Pin, at: number} | null} */
     let gone = null;
     const list = el("section");
-    const undo = button("Undo", () => {
-      if (!gone) return;
-      const all = pins();
-      all.splice(gone.at, 0, gone.pin);
-      gone = null;
-      store(all.slice(0, MOST));
-      show();
-    }, { hidden: true });
-    const axis = selectField("Axis", [], { onchange: (value) => { state.set({ axis: value }, true); show(); } });
-    const which = selectField("State", [], { onchange: (value) => { state.set({ state: value }, true); show(); } });
+    const undo = button(
+      "Undo",
+      () => {
+        if (!gone) return;
+        const all = pins();
+        all.splice(gone.at, 0, gone.pin);
+        gone = null;
+        store(all.slice(0, MOST));
+        show();
+      },
+      { hidden: true },
+    );
+    const axis = selectField("Axis", [], {
+      onchange: (value) => {
+        state.set({ axis: value }, true);
+        show();
+      },
+    });
+    const which = selectField("State", [], {
+      onchange: (value) => {
+        state.set({ state: value }, true);
+        show();
+      },
+    });
     const log = selectField("Log", [], { onchange: (value) => state.set({ "compare.log": value }) });
     const problem = el("p", { className: "error", role: "alert", hidden: true });
     const against = button("Put the noise models to this log", judge);
-    const judged = el("section", null, el("h2", null, "Against a log"), log, el("div", { className: "row" }, against), problem);
-    const plot = figure({ title: "Predicted standard deviation σ(t)", x: "time (s)", y: "", xLog: true, yLog: true, height: 380 });
+    const judged = el(
+      "section",
+      null,
+      el("h2", null, "Against a log"),
+      log,
+      el("div", { className: "row" }, against),
+      problem,
+    );
+    const plot = figure({
+      title: "Predicted standard deviation σ(t)",
+      x: "time (s)",
+      y: "",
+      xLog: true,
+      yLog: true,
+      height: 380,
+    });
     const tables = el("section");
-    fill(root, el("div", { className: "controls" }, list, el("div", { className: "row" }, undo), axis, which, judged), el("div", { className: "figures" }, plot, tables));
+    fill(
+      root,
+      el("div", { className: "controls" }, list, el("div", { className: "row" }, undo), axis, which, judged),
+      el("div", { className: "figures" }, plot, tables),
+    );
 
     /** @param {Pin[]} all */
     function names(all) {
-      fill(list, el("h2", null, "Pinned designs"), all.length ? null : el("p", null, "None yet. ", button("Make one in Design", () => ctx.open("design"))),
-        el("ul", { className: "files" }, all.map((it, at) => {
-          const name = el("input", { type: "text", value: it.name, "aria-label": `name of ${it.name}`, size: 11, onchange: () => {
-            const next = name.value.trim().replaceAll("|", " ");
-            if (!next || all.some((other) => other !== it && other.name === next)) {
-              name.value = it.name;
-              return announce("a name must be there, and once only");
-            }
-            it.name = next;
-            store(all);
-            show();
-          } });
-          return el("li", { className: "row" }, name,
-            button("Open", () => ctx.open("design", it.view), { "aria-label": `Open ${it.name} in Design` }),
-            button("Delete", () => {
-              gone = { pin: it, at };
-              all.splice(at, 1);
-              store(all);
-              announce(`deleted ${it.name}`);
-              show();
-              undo.focus();
-            }, { "aria-label": `Delete ${it.name}` }));
-        })));
+      fill(
+        list,
+        el("h2", null, "Pinned designs"),
+        all.length
+          ? null
+          : el(
+              "p",
+              null,
+              "None yet. ",
+              button("Make one in Design", () => ctx.open("design")),
+            ),
+        el(
+          "ul",
+          { className: "files" },
+          all.map((it, at) => {
+            const name = el("input", {
+              type: "text",
+              value: it.name,
+              "aria-label": `name of ${it.name}`,
+              size: 11,
+              onchange: () => {
+                const next = name.value.trim().replaceAll("|", " ");
+                if (!next || all.some((other) => other !== it && other.name === next)) {
+                  name.value = it.name;
+                  return announce("a name must be there, and once only");
+                }
+                it.name = next;
+                store(all);
+                show();
+              },
+            });
+            return el(
+              "li",
+              { className: "row" },
+              name,
+              button("Open", () => ctx.open("design", it.view), { "aria-label": `Open ${it.name} in Design` }),
+              button(
+                "Delete",
+                () => {
+                  gone = { pin: it, at };
+                  all.splice(at, 1);
+                  store(all);
+                  announce(`deleted ${it.name}`);
+                  show();
+                  undo.focus();
+                },
+                { "aria-label": `Delete ${it.name}` },
+              ),
+            );
+          }),
+        ),
+      );
       undo.hidden = !gone;
       undo.textContent = gone ? `Undo: bring ${gone.pin.name} back` : "Undo";
     }
@@ -99,34 +160,83 @@ export const panel = {
       for (const part of [plot, axis, which, tables, judged]) part.hidden = !any;
       if (!any) return;
       const axes = [...new Set(all.flatMap((it) => it.axes.map(({ name }) => name)))];
-      axis.set(axes.map((name, i) => /** @type {[string, string]} */ ([`${i}`, name])), state.get("axis", "0"));
+      axis.set(
+        axes.map((name, i) => /** @type {[string, string]} */ ([`${i}`, name])),
+        state.get("axis", "0"),
+      );
       axis.hidden = axes.length < 2;
       const at = axes[Number(axis.input.value)] ?? axes[0];
       /** @param {Pin} it */
       const own = (it) => it.axes.find(({ name }) => name === at) ?? it.axes[0];
       const states = new Map(all.flatMap((it) => own(it).states.map(({ name, unit }) => [name, unit])));
-      which.set([...states].map(([name, unit]) => /** @type {[string, string]} */ ([name, `${name} (${unit})`])), state.get("state") || [...states.keys()][0]);
+      which.set(
+        [...states].map(([name, unit]) => /** @type {[string, string]} */ ([name, `${name} (${unit})`])),
+        state.get("state") || [...states.keys()][0],
+      );
       const name = which.input.value;
       plot.setAxis(`σ (${states.get(name) ?? ""})`);
-      plot.set(all.flatMap((it) => sigmaLine(own(it), name, { name: it.name, colour: it.colour, dash: (it.colour ?? 1) - 1, width: 2 })));
-      const head = ["", ...all.map((it) => it.name)];
+      plot.set(
+        all.flatMap((it) =>
+          sigmaLine(own(it), name, { name: it.name, colour: it.colour, dash: (it.colour ?? 1) - 1, width: 2 }),
+        ),
+      );
+      const head = ["Design", ...all.map((it) => it.name)];
       /** @param {Pin} it */
       const found = (it) => own(it).states.find((one) => one.name === name);
       const sources = [...new Set(all.flatMap((it) => found(it)?.budget.map((part) => part.name) ?? []))];
-      fill(tables,
-        table({ caption: `${name}, axis ${at}`, head, rows: [
-          ["Plant", ...all.map((it) => it.plant || "of the parameters")],
-          ["σ at the start", ...all.map((it) => number(found(it)?.sigma[0]))],
-          ["σ at the end", ...all.map((it) => number(found(it)?.sigma.at(-1)))],
-          ["Settled after, s", ...all.map((it) => number(own(it).settling, 3))],
-          ["Verdict", ...all.map((it) => it.verdict)],
-          ...(all.some((it) => it.against) ? [["Noise model against the log", ...all.map((it) => (it.against ? `${it.against.verdict} (${it.against.log})` : "–"))]] : []),
-        ] }),
-        sources.length ? table({ caption: `Error budget of ${name}, steady, %`, head, rows: sources.map((source) =>
-          [source, ...all.map((it) => { const part = found(it)?.budget.find((one) => one.name === source); return part ? number(100 * part.share, 3) : "–"; })]) }) : null,
-        table({ caption: "σ at the end, every state", head: ["State", ...all.map((it) => it.name)], rows: [...states].map(([one, unit]) =>
-          [`${one} (${unit})`, ...all.map((it) => number(own(it).states.find((s) => s.name === one)?.sigma.at(-1)))]) }));
-      log.set(ctx.project.files.filter(({ kind }) => kind === "log").map(({ name }) => name), state.get("compare.log") || state.get("log"));
+      fill(
+        tables,
+        table({
+          caption: `${name}, axis ${at}`,
+          head,
+          rows: [
+            ["Plant", ...all.map((it) => it.plant || "of the parameters")],
+            ["σ at the start", ...all.map((it) => number(found(it)?.sigma[0]))],
+            ["σ at the end", ...all.map((it) => number(found(it)?.sigma.at(-1)))],
+            ["Settled after, s", ...all.map((it) => number(own(it).settling, 3))],
+            ["Verdict", ...all.map((it) => it.verdict)],
+            ...(all.some((it) => it.against)
+              ? [
+                  [
+                    "Noise model against the log",
+                    ...all.map((it) => (it.against ? `${it.against.verdict} (${it.against.log})` : "–")),
+                  ],
+                ]
+              : []),
+          ],
+        }),
+        sources.length
+          ? table({
+              caption: `Error budget of ${name}, steady, %`,
+              head,
+              rows: sources.map((source) => [
+                source,
+                ...all.map((it) => {
+                  const part = found(it)?.budget.find((one) => one.name === source);
+                  return part ? number(100 * part.share, 3) : "–";
+                }),
+              ]),
+            })
+          : null,
+        table({
+          caption: "σ at the end, every state",
+          head: ["State", ...all.map((it) => it.name)],
+          rows: [...states].map(([one, unit]) => [
+            `${one} (${unit})`,
+            ...all.map((it) =>
+              number(
+                own(it)
+                  .states.find((s) => s.name === one)
+                  ?.sigma.at(-1),
+              ),
+            ),
+          ]),
+        }),
+      );
+      log.set(
+        ctx.project.files.filter(({ kind }) => kind === "log").map(({ name }) => name),
+        state.get("compare.log") || state.get("log"),
+      );
       against.disabled = !log.input.value;
     }
 
@@ -137,7 +247,11 @@ export const panel = {
       for (const it of all) {
         try {
           const own = log.input.value === state.get("log");
-          const job = await api.run("compare", { params: "draft:params.json", log: log.input.value, ...(own ? { reading: reading() } : {}) }, { drafts: { "params.json": it.params } });
+          const job = await api.run(
+            "compare",
+            { params: "draft:params.json", log: log.input.value, ...(own ? { reading: reading() } : {}) },
+            { drafts: { "params.json": it.params } },
+          );
           const document = await api.document_(job.id);
           it.against = { log: log.input.value, verdict: document.verdict, meaning: document.meaning };
         } catch (error) {

@@ -5,15 +5,33 @@ import { FOUND, kept, parameters } from "./panel_noise.js";
 import { budget, figure } from "./plot.js";
 import * as state from "./state.js";
 import {
-  announce, button, checkField, details, el, exportMenu, fill, jobView, number, selectField, slider, table, textField,
+  announce,
+  button,
+  checkField,
+  details,
+  el,
+  exportMenu,
+  fill,
+  jobView,
+  number,
+  selectField,
+  slider,
+  table,
+  textField,
 } from "./ui.js";
 
 /** Sliders go from half to eight times what was identified; a span that an interval needs is added. */
 const [LEAST, MOST] = [0.5, 8];
 /** Rates of aids that a slider reaches about the one typed. */
 const RATE_REACH = 10;
-const PLANTS = [["static", "static: the sensor alone"], ["angle", "angle: one axis, integrated"], ["rate", "rate: the rate itself is wanted"],
-  ["vertical", "vertical: height and speed"], ["attitude", "attitude: three axes"], ["airplane", "airplane"]];
+const PLANTS = [
+  ["static", "static: the sensor alone"],
+  ["angle", "angle: one axis, integrated"],
+  ["rate", "rate: the rate itself is wanted"],
+  ["vertical", "vertical: height and speed"],
+  ["attitude", "attitude: three axes"],
+  ["airplane", "airplane"],
+];
 /** Radians are for computers. @type {Record<string, [string, number]>} */
 const SHOWN = { rad: ["deg", 180 / Math.PI], "rad/s": ["deg/s", 180 / Math.PI] };
 
@@ -32,25 +50,62 @@ export function results(document) {
   if (document.at_rest) {
     const rest = document.at_rest;
     /** @param {string} name @param {string} unit @param {(it: any) => number} of */
-    const column = (name, unit, of) => ({ name, unit: shownUnit(unit)[0], sigma: rest.map((/** @type {any} */ it) => of(it) * shownUnit(unit)[1]), budget: [], gain: [] });
-    return [{
-      name: "attitude", time: rest.map((/** @type {any} */ it) => it.time_s), settling: null, poles: [], notes: document.filter.tuning?.decisions ?? [],
-      states: [column("inclination", "rad", (it) => it.inclination), column("heading", "rad", (it) => it.heading),
-        ...["x", "y", "z"].map((axis, i) => column(`drift ${axis}`, "rad/s", (it) => it.drift[i]))],
-    }];
+    const column = (name, unit, of) => ({
+      name,
+      unit: shownUnit(unit)[0],
+      sigma: rest.map((/** @type {any} */ it) => of(it) * shownUnit(unit)[1]),
+      budget: [],
+      gain: [],
+    });
+    return [
+      {
+        name: "attitude",
+        time: rest.map((/** @type {any} */ it) => it.time_s),
+        settling: null,
+        poles: [],
+        notes: document.filter.tuning?.decisions ?? [],
+        states: [
+          column("inclination", "rad", (it) => it.inclination),
+          column("heading", "rad", (it) => it.heading),
+          ...["x", "y", "z"].map((axis, i) => column(`drift ${axis}`, "rad/s", (it) => it.drift[i])),
+        ],
+      },
+    ];
   }
   return document.reports.map((/** @type {any} */ report, /** @type {number} */ i) => {
     const axis = document.filter.axes[i];
     const { predicted } = report;
-    const plants = new Map((report.plant_budgets ?? []).map((/** @type {any} */ it) => [it.state, shares(it.error_budget)]));
+    const plants = new Map(
+      (report.plant_budgets ?? []).map((/** @type {any} */ it) => [it.state, shares(it.error_budget)]),
+    );
     const states = axis.states.map((/** @type {any} */ it, /** @type {number} */ n) => {
       const [unit, factor] = shownUnit(it.unit);
-      return { name: it.name, unit, sigma: predicted.sigma[n].map((/** @type {number} */ v) => v * factor), budget: plants.get(it.name) ?? [], gain: axis.steady_state?.gain?.[n] ?? [] };
+      return {
+        name: it.name,
+        unit,
+        sigma: predicted.sigma[n].map((/** @type {number} */ v) => v * factor),
+        budget: plants.get(it.name) ?? [],
+        gain: axis.steady_state?.gain?.[n] ?? [],
+      };
     });
     const drift = axis.inputs?.[0]?.unit ?? axis.states.at(-1)?.unit ?? "";
     const [unit, factor] = shownUnit(drift);
-    if (predicted.total) states.push({ name: "drift in all", unit, sigma: predicted.total.map((/** @type {number} */ v) => v * factor), budget: shares(report.error_budget), gain: [] });
-    return { name: report.name, time: predicted.time_s, states, settling: report.settling_time_s ?? null, poles: axis.steady_state?.poles ?? [], notes: [...report.observability, ...report.warnings] };
+    if (predicted.total)
+      states.push({
+        name: "drift in all",
+        unit,
+        sigma: predicted.total.map((/** @type {number} */ v) => v * factor),
+        budget: shares(report.error_budget),
+        gain: [],
+      });
+    return {
+      name: report.name,
+      time: predicted.time_s,
+      states,
+      settling: report.settling_time_s ?? null,
+      poles: axis.steady_state?.poles ?? [],
+      notes: [...report.observability, ...report.warnings],
+    };
   });
 }
 
@@ -68,7 +123,12 @@ export function sigmaLine(axis, state, look) {
 /** @param {Aid} aid @param {number} [factor] on its rate */
 function aidText(aid, factor = 1) {
   const rate = aid.rate.match(/^([0-9.eE+-]+)\s*(\D*)$/);
-  const at = rate && factor !== 1 ? `${state.digits4(Number(rate[1]) * factor)} ${rate[2] || "Hz"}` : aid.rate && /^[0-9.]+$/.test(aid.rate) ? `${aid.rate} Hz` : aid.rate;
+  const at =
+    rate && factor !== 1
+      ? `${state.digits4(Number(rate[1]) * factor)} ${rate[2] || "Hz"}`
+      : aid.rate && /^[0-9.]+$/.test(aid.rate)
+        ? `${aid.rate} Hz`
+        : aid.rate;
   return `${aid.name ? `${aid.name}: ` : ""}${aid.sigma}${at ? ` @ ${at}` : ""}${aid.drift ? `, ${aid.drift}` : ""}`;
 }
 
@@ -95,19 +155,43 @@ export const panel = {
     let aids = [];
 
     const source = selectField("Sensor", [], { onchange: (value) => change({ params: value, x: null }) });
-    const plant = selectField("Plant", /** @type {[string, string][]} */ (PLANTS), { onchange: (value) => change({ plant: value, state: null }) });
-    const motion = textField("Motion", { placeholder: "20 deg/s over 0.5 s", onchange: (value) => change({ motion: value }), hint: "σ over correlation time, or a density" });
+    const plant = selectField("Plant", /** @type {[string, string][]} */ (PLANTS), {
+      onchange: (value) => change({ plant: value, state: null }),
+    });
+    const motion = textField("Motion", {
+      placeholder: "20 deg/s over 0.5 s",
+      onchange: (value) => change({ motion: value }),
+      hint: "σ over correlation time, or a density",
+    });
     const accelerometer = selectField("Accelerometer", [], { onchange: (value) => change({ accelerometer: value }) });
     const flight = selectField("Flight", [], { onchange: (value) => change({ flight: value }) });
     const aidRows = el("div");
-    const axis = selectField("Axis", [], { onchange: (value) => { state.set({ axis: value }, true); sliders(); draw(); } });
+    const axis = selectField("Axis", [], {
+      onchange: (value) => {
+        state.set({ axis: value }, true);
+        sliders();
+        draw();
+      },
+    });
     const knobs = el("div");
     const reset = button("Back to the identified numbers", () => change({ x: null }));
     const job = jobView();
     const brief = el("section");
     const problem = el("p", { className: "error", role: "alert", hidden: true });
-    const which = selectField("State", [], { onchange: (value) => { state.set({ state: value }, true); draw(); } });
-    const plot = figure({ title: "Predicted standard deviation σ(t)", x: "time (s)", y: "", xLog: true, yLog: true, height: 360 });
+    const which = selectField("State", [], {
+      onchange: (value) => {
+        state.set({ state: value }, true);
+        draw();
+      },
+    });
+    const plot = figure({
+      title: "Predicted standard deviation σ(t)",
+      x: "time (s)",
+      y: "",
+      xLog: true,
+      yLog: true,
+      height: 360,
+    });
     const shares = el("div");
     const steady = el("section");
     const notes = el("section");
@@ -117,14 +201,19 @@ export const panel = {
     const pinName = textField("Name of the pin", { size: 14 });
     const pinned = button("Pin for Compare", keep);
     const out = el("div");
-    fill(root,
-      el("div", { className: "controls" },
+    fill(
+      root,
+      el(
+        "div",
+        { className: "controls" },
         el("section", null, source, plant, motion, accelerometer, flight),
         el("section", null, el("h2", null, "Aids"), aidRows),
         el("section", null, el("h2", null, "Parameters"), axis, knobs, el("div", { className: "row" }, reset)),
         el("section", null, el("div", { className: "row" }, verify), more, job, out),
-        el("section", null, el("div", { className: "row" }, pinName, pinned))),
-      el("div", { className: "figures" }, problem, brief, which, plot, shares, steady, insight, notes));
+        el("section", null, el("div", { className: "row" }, pinName, pinned)),
+      ),
+      el("div", { className: "figures" }, problem, brief, which, plot, shares, steady, insight, notes),
+    );
 
     /** @param {Record<string, any>} values */
     function change(values) {
@@ -138,13 +227,35 @@ export const panel = {
       const files = ctx.project.files;
       const sensors = files.filter(({ kind }) => kind === "params").map(({ name }) => name);
       const found = kept(FOUND);
-      const options = /** @type {[string, string][]} */ ([...(found ? [["", "as identified here, not saved"]] : []), ...sensors.map((name) => [name, name])]);
-      source.set(options.length ? options : [["", "no params.json yet"]], state.get("params") || (found ? "" : sensors[0] ?? ""));
-      accelerometer.set([["", "choose"], ...sensors.map((name) => /** @type {[string, string]} */ ([name, name]))], state.get("accelerometer"));
-      flight.set([["", "choose"], ...files.filter(({ kind }) => kind === "flight").map(({ name }) => /** @type {[string, string]} */ ([name, name]))], state.get("flight"));
-      const designs = files.filter(({ kind }) => kind === "design").map(({ name }) => /** @type {[string, string]} */ ([name, name]));
+      const options = /** @type {[string, string][]} */ ([
+        ...(found ? [["", "as identified here, not saved"]] : []),
+        ...sensors.map((name) => [name, name]),
+      ]);
+      source.set(
+        options.length ? options : [["", "no params.json yet"]],
+        state.get("params") || (found ? "" : (sensors[0] ?? "")),
+      );
+      accelerometer.set(
+        [["", "choose"], ...sensors.map((name) => /** @type {[string, string]} */ ([name, name]))],
+        state.get("accelerometer"),
+      );
+      flight.set(
+        [
+          ["", "choose"],
+          ...files
+            .filter(({ kind }) => kind === "flight")
+            .map(({ name }) => /** @type {[string, string]} */ ([name, name])),
+        ],
+        state.get("flight"),
+      );
+      const designs = files
+        .filter(({ kind }) => kind === "design")
+        .map(({ name }) => /** @type {[string, string]} */ ([name, name]));
       const own = params?.design ? [["", "the design of the parameters"]] : [];
-      plant.set(/** @type {[string, string][]} */ ([...own, ...PLANTS, ...designs]), state.get("plant", own.length ? "" : "static"));
+      plant.set(
+        /** @type {[string, string][]} */ ([...own, ...PLANTS, ...designs]),
+        state.get("plant", own.length ? "" : "static"),
+      );
       const is = plant.input.value;
       motion.hidden = is !== "rate";
       motion.input.value = state.get("motion");
@@ -160,13 +271,28 @@ export const panel = {
       loaded = key;
       params = name ? await api.file(name) : found;
       base = null;
-      if (params) axis.set(params.axes.map((/** @type {any} */ it, /** @type {number} */ i) => [`${i}`, it.name]), state.get("axis", "0"));
+      if (params)
+        axis.set(
+          params.axes.map((/** @type {any} */ it, /** @type {number} */ i) => [`${i}`, it.name]),
+          state.get("axis", "0"),
+        );
     }
 
     /** The parameters of an axis that a filter uses. @param {any} one */
     const physical = (one) => [
       ...parameters(one),
-      ...(one.turn_on_bias ? [{ id: "turn_on_bias.std_dev", term: "turn_on_bias", at: 0, field: "std_dev", name: "Turn-on bias σ", value: one.turn_on_bias.std_dev }] : []),
+      ...(one.turn_on_bias
+        ? [
+            {
+              id: "turn_on_bias.std_dev",
+              term: "turn_on_bias",
+              at: 0,
+              field: "std_dev",
+              name: "Turn-on bias σ",
+              value: one.turn_on_bias.std_dev,
+            },
+          ]
+        : []),
     ];
 
     function draft() {
@@ -190,9 +316,14 @@ export const panel = {
         const { value, unit, interval } = it.value;
         const ends = (interval ?? []).filter((/** @type {any} */ v) => v > 0);
         return slider({
-          label: it.name, unit, value: value * (factors.get(it.id) ?? 1), interval,
-          min: Math.min(LEAST * value, ...ends), max: Math.max(MOST * value, ...ends),
-          onInput: (v) => move(it.id, v / value), onChange: () => state.set({ x: words() }, true),
+          label: it.name,
+          unit,
+          value: value * (factors.get(it.id) ?? 1),
+          interval,
+          min: Math.min(LEAST * value, ...ends),
+          max: Math.max(MOST * value, ...ends),
+          onInput: (v) => move(it.id, v / value),
+          onChange: () => state.set({ x: words() }, true),
         });
       });
       const rates = aids.map((aid, i) => {
@@ -200,15 +331,33 @@ export const panel = {
         if (!rate || !(Number(rate[1]) > 0)) return null;
         const hz = Number(rate[1]);
         return slider({
-          label: `Rate of ${aid.name || "the aid"}`, unit: aid.rate.slice(rate[1].length).trim() || "Hz", value: hz * (factors.get(`aid${i}`) ?? 1),
-          min: hz / RATE_REACH, max: hz * RATE_REACH, onInput: (v) => move(`aid${i}`, v / hz), onChange: () => state.set({ x: words() }, true),
+          label: `Rate of ${aid.name || "the aid"}`,
+          unit: aid.rate.slice(rate[1].length).trim() || "Hz",
+          value: hz * (factors.get(`aid${i}`) ?? 1),
+          min: hz / RATE_REACH,
+          max: hz * RATE_REACH,
+          onInput: (v) => move(`aid${i}`, v / hz),
+          onChange: () => state.set({ x: words() }, true),
         });
       });
-      fill(knobs, el("p", { className: "hint" }, params.axes.length > 1 ? "A slider moves its parameter of every axis by the same factor." : ""), rows, rates);
+      fill(
+        knobs,
+        el(
+          "p",
+          { className: "hint" },
+          params.axes.length > 1 ? "A slider moves its parameter of every axis by the same factor." : "",
+        ),
+        rows,
+        rates,
+      );
       axis.hidden = params.axes.length < 2;
     }
 
-    const words = () => [...factors].filter(([, f]) => f !== 1).map(([id, f]) => `${id}=${state.digits4(f)}`).join(";");
+    const words = () =>
+      [...factors]
+        .filter(([, f]) => f !== 1)
+        .map(([id, f]) => `${id}=${state.digits4(f)}`)
+        .join(";");
 
     /** @param {string} id @param {number} factor */
     function move(id, factor) {
@@ -228,17 +377,64 @@ export const panel = {
     }
 
     function showAids() {
-      const change = () => { state.set({ aids: aids.length ? JSON.stringify(aids) : null, x: words() }, true); fresh(); };
-      const add = (/** @type {Aid} */ aid) => { aids.push(aid); change(); };
-      fill(aidRows, aids.map((aid, i) => {
-        /** @param {keyof Aid} key @param {string} label @param {string} placeholder */
-        const part = (key, label, placeholder) => textField(label, { value: aid[key], placeholder, size: 9, onchange: (value) => { aid[key] = value; change(); } });
-        return el("fieldset", null, el("legend", null, aid.name || `aid ${i + 1}`),
-          el("div", { className: "row" }, part("name", "Name", "heading"), part("sigma", "σ", "2 deg"), part("rate", "Rate", "1 Hz"), part("drift", "Drift", "1 deg over 60 s"),
-            button("Remove", () => { aids.splice(i, 1); factors.delete(`aid${i}`); change(); }, { "aria-label": `Remove ${aid.name || `aid ${i + 1}`}` })));
-      }), aids.length ? null : el("p", { className: "hint" }, "None."),
-      el("div", { className: "row" }, button("Add an aid", () => add(plant.input.value === "vertical"
-        ? { name: "altitude", sigma: "1 m", rate: "10 Hz", drift: "" } : { name: "heading", sigma: "2 deg", rate: "1 Hz", drift: "" }))));
+      const change = () => {
+        state.set({ aids: aids.length ? JSON.stringify(aids) : null, x: words() }, true);
+        fresh();
+      };
+      const add = (/** @type {Aid} */ aid) => {
+        aids.push(aid);
+        change();
+      };
+      fill(
+        aidRows,
+        aids.map((aid, i) => {
+          /** @param {keyof Aid} key @param {string} label @param {string} placeholder */
+          const part = (key, label, placeholder) =>
+            textField(label, {
+              value: aid[key],
+              placeholder,
+              size: 9,
+              onchange: (value) => {
+                aid[key] = value;
+                change();
+              },
+            });
+          return el(
+            "fieldset",
+            null,
+            el("legend", null, aid.name || `aid ${i + 1}`),
+            el(
+              "div",
+              { className: "row" },
+              part("name", "Name", "heading"),
+              part("sigma", "σ", "2 deg"),
+              part("rate", "Rate", "1 Hz"),
+              part("drift", "Drift", "1 deg over 60 s"),
+              button(
+                "Remove",
+                () => {
+                  aids.splice(i, 1);
+                  factors.delete(`aid${i}`);
+                  change();
+                },
+                { "aria-label": `Remove ${aid.name || `aid ${i + 1}`}` },
+              ),
+            ),
+          );
+        }),
+        aids.length ? null : el("p", { className: "hint" }, "None."),
+        el(
+          "div",
+          { className: "row" },
+          button("Add an aid", () =>
+            add(
+              plant.input.value === "vertical"
+                ? { name: "altitude", sigma: "1 m", rate: "10 Hz", drift: "" }
+                : { name: "heading", sigma: "2 deg", rate: "1 Hz", drift: "" },
+            ),
+          ),
+        ),
+      );
     }
 
     // ---------------------------------------------------------------------------------------------------- answers
@@ -248,7 +444,8 @@ export const panel = {
       return {
         params: "draft:params.json",
         plant: {
-          ...(is ? { plant: is } : {}), ...(aids.length ? { aid: aids.map((aid, i) => aidText(aid, factors.get(`aid${i}`))) } : {}),
+          ...(is ? { plant: is } : {}),
+          ...(aids.length ? { aid: aids.map((aid, i) => aidText(aid, factors.get(`aid${i}`))) } : {}),
           ...(is === "rate" ? { motion: state.get("motion") || "20 deg/s over 0.5 s" } : {}),
           ...(accelerometer.hidden || !state.get("accelerometer") ? {} : { accelerometer: state.get("accelerometer") }),
           ...(flight.hidden || !state.get("flight") ? {} : { flight: state.get("flight") }),
@@ -257,7 +454,8 @@ export const panel = {
     }
 
     const preview = api.latest(
-      (/** @type {{request: any, draft: any, key: string, plain: boolean}} */ it) => api.preview("tune", { ...it.request, runs: 0 }, { drafts: { "params.json": it.draft } }),
+      (/** @type {{request: any, draft: any, key: string, plain: boolean}} */ it) =>
+        api.preview("tune", { ...it.request, runs: 0 }, { drafts: { "params.json": it.draft } }),
       (made, it) => {
         problem.hidden = true;
         document = made;
@@ -269,7 +467,8 @@ export const panel = {
       (error) => {
         problem.hidden = false;
         problem.textContent = error.message;
-      });
+      },
+    );
 
     function ask() {
       if (!params) return;
@@ -289,18 +488,65 @@ export const panel = {
       if (!shown.length) return;
       const at = Math.min(Number(state.get("axis", "0")) || 0, shown.length - 1);
       const own = shown[at];
-      which.set(own.states.map(({ name, unit }) => /** @type {[string, string]} */ ([name, `${name} (${unit})`])), state.get("state") || own.states[0].name);
+      which.set(
+        own.states.map(({ name, unit }) => /** @type {[string, string]} */ ([name, `${name} (${unit})`])),
+        state.get("state") || own.states[0].name,
+      );
       const name = which.input.value;
       const found = own.states.find((it) => it.name === name) ?? own.states[0];
       plot.setAxis(`σ (${found.unit})`);
-      const before = base && base.axes !== shown ? sigmaLine(base.axes[at], name, { name: "as identified", colour: 0, dash: 1, width: 1 }) : [];
+      const before =
+        base && base.axes !== shown
+          ? sigmaLine(base.axes[at], name, { name: "as identified", colour: 0, dash: 1, width: 1 })
+          : [];
       plot.set([...sigmaLine(own, name, { name: `${name}, axis ${own.name}`, colour: 1, width: 2 }), ...before]);
-      fill(shares, found.budget.length ? budget(`Error budget of ${name}, steady`, [...found.budget].sort((a, b) => b.share - a.share)) : null);
-      fill(steady, el("h2", null, "Steady state"), table({
-        caption: `Axis ${own.name}${own.settling ? `, settled after ${number(own.settling, 3)} s` : ""}`, head: ["State", "σ at the start", "σ at the end", "Unit", ...(own.states[0].gain.length ? ["Gain"] : [])],
-        rows: own.states.map((it) => [it.name, number(it.sigma[0]), number(it.sigma.at(-1)), it.unit, ...(own.states[0].gain.length ? [it.gain.map((g) => number(g)).join(", ")] : [])]),
-      }), own.poles.length ? details("Poles of the steady filter", table({ caption: "z plane, per update", head: ["Pole", "Real", "Imaginary"], rows: own.poles.map(([re, im], i) => [`${i + 1}`, number(re, 6), number(im, 6)]) })) : null);
-      fill(notes, own.notes.length ? [el("h2", null, "What is to be known"), el("ul", { className: "notes" }, own.notes.map((text) => el("li", null, text)))] : null);
+      fill(
+        shares,
+        found.budget.length
+          ? budget(
+              `Error budget of ${name}, steady`,
+              [...found.budget].sort((a, b) => b.share - a.share),
+            )
+          : null,
+      );
+      fill(
+        steady,
+        el("h2", null, "Steady state"),
+        table({
+          caption: `Axis ${own.name}${own.settling ? `, settled after ${number(own.settling, 3)} s` : ""}`,
+          head: ["State", "σ at the start", "σ at the end", "Unit", ...(own.states[0].gain.length ? ["Gain"] : [])],
+          rows: own.states.map((it) => [
+            it.name,
+            number(it.sigma[0]),
+            number(it.sigma.at(-1)),
+            it.unit,
+            ...(own.states[0].gain.length ? [it.gain.map((g) => number(g)).join(", ")] : []),
+          ]),
+        }),
+        own.poles.length
+          ? details(
+              "Poles of the steady filter",
+              table({
+                caption: "z plane, per update",
+                head: ["Pole", "Real", "Imaginary"],
+                rows: own.poles.map(([re, im], i) => [`${i + 1}`, number(re, 6), number(im, 6)]),
+              }),
+            )
+          : null,
+      );
+      fill(
+        notes,
+        own.notes.length
+          ? [
+              el("h2", null, "What is to be known"),
+              el(
+                "ul",
+                { className: "notes" },
+                own.notes.map((text) => el("li", null, text)),
+              ),
+            ]
+          : null,
+      );
     }
 
     async function check() {
@@ -308,13 +554,29 @@ export const panel = {
       [out, brief, insight].forEach((part) => fill(part));
       verified = null;
       try {
-        const done = await api.run("tune", { ...request(), ...(more.input.checked ? { insight: true } : {}) }, { drafts: { "params.json": draft() }, onJob: job.update });
+        const done = await api.run(
+          "tune",
+          { ...request(), ...(more.input.checked ? { insight: true } : {}) },
+          { drafts: { "params.json": draft() }, onJob: job.update },
+        );
         document = await api.document_(done.id);
         verified = done;
         shown = results(document);
         draw();
-        fill(brief, el("h2", null, `Verified: ${done.verdict ?? document.verification?.verdict ?? ""}`), el("pre", { tabIndex: 0 }, done.brief ?? ""));
-        fill(out, exportMenu(done, { stem: "filter", file: "filter.json", onSave: () => ctx.refresh(), readOnly: ctx.project.read_only }));
+        fill(
+          brief,
+          el("h2", null, `Verified: ${done.verdict ?? document.verification?.verdict ?? ""}`),
+          el("pre", { tabIndex: 0 }, done.brief ?? ""),
+        );
+        fill(
+          out,
+          exportMenu(done, {
+            stem: "filter",
+            file: "filter.json",
+            onSave: () => ctx.refresh(),
+            readOnly: ctx.project.read_only,
+          }),
+        );
         if (document.insight) showInsight(document.insight);
       } catch (error) {
         job.fail(/** @type {Error} */ (error));
@@ -324,23 +586,38 @@ export const panel = {
     /** σ of every output were a part so many times better or worse. @param {any[]} axes */
     function showInsight(axes) {
       const at = Math.min(Number(state.get("axis", "0")) || 0, axes.length - 1);
-      fill(insight, el("h2", null, "What other parts buy"), axes[at].outputs.map((/** @type {any} */ output) => {
-        const [unit, factor] = shownUnit(output.unit);
-        const { factors } = output.worth[0];
-        return table({
-          caption: `σ of ${output.name} (${unit}) if a parameter were so many times as large; now ${number(output.sigma * factor)}`,
-          head: ["Parameter", ...factors.map((/** @type {number} */ f) => `×${number(f, 3)}`)],
-          rows: output.worth.map((/** @type {any} */ it) => [it.parameter, ...it.sigma.map((/** @type {number} */ v) => number(v * factor, 3))]),
-        });
-      }));
+      fill(
+        insight,
+        el("h2", null, "What other parts buy"),
+        axes[at].outputs.map((/** @type {any} */ output) => {
+          const [unit, factor] = shownUnit(output.unit);
+          const { factors } = output.worth[0];
+          return table({
+            caption: `σ of ${output.name} (${unit}) if a parameter were so many times as large; now ${number(output.sigma * factor)}`,
+            head: ["Parameter", ...factors.map((/** @type {number} */ f) => `×${number(f, 3)}`)],
+            rows: output.worth.map((/** @type {any} */ it) => [
+              it.parameter,
+              ...it.sigma.map((/** @type {number} */ v) => number(v * factor, 3)),
+            ]),
+          });
+        }),
+      );
     }
 
     function keep() {
       if (!document || !params) return announce("nothing to pin yet");
-      const name = pinName.input.value.trim() || `${plant.input.value || "design"} ${words() || "as identified"}`.slice(0, 40);
+      const name =
+        pinName.input.value.trim() || `${plant.input.value || "design"} ${words() || "as identified"}`.slice(0, 40);
       const failed = pin({
-        name, plant: plant.input.value, axes: shown, verdict: document.verification?.verdict ?? "not verified", params: draft(),
-        request: request(), view: Object.fromEntries(["params", "plant", "aids", "motion", "accelerometer", "x"].map((key) => [key, state.get(key)])),
+        name,
+        plant: plant.input.value,
+        axes: shown,
+        verdict: document.verification?.verdict ?? "not verified",
+        params: draft(),
+        request: request(),
+        view: Object.fromEntries(
+          ["params", "plant", "aids", "motion", "accelerometer", "x"].map((key) => [key, state.get(key)]),
+        ),
       });
       announce(failed ?? `pinned: ${name}`);
       pinned.textContent = failed ?? "Pinned";
@@ -348,10 +625,16 @@ export const panel = {
     }
 
     async function fresh() {
-      factors = new Map(state.get("x").split(";").filter(Boolean).map((text) => {
-        const cut = text.lastIndexOf("=");
-        return /** @type {[string, number]} */ ([text.slice(0, cut), Number(text.slice(cut + 1))]);
-      }));
+      factors = new Map(
+        state
+          .get("x")
+          .split(";")
+          .filter(Boolean)
+          .map((text) => {
+            const cut = text.lastIndexOf("=");
+            return /** @type {[string, number]} */ ([text.slice(0, cut), Number(text.slice(cut + 1))]);
+          }),
+      );
       readAids();
       lists();
       try {
@@ -366,7 +649,11 @@ export const panel = {
       sliders();
       if (!params) {
         problem.hidden = false;
-        fill(problem, "There are no noise parameters yet. ", button("Identify them", () => ctx.open("noise")));
+        fill(
+          problem,
+          "There are no noise parameters yet. ",
+          button("Identify them", () => ctx.open("noise")),
+        );
         return;
       }
       ask();

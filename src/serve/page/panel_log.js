@@ -3,7 +3,19 @@
 import { figure } from "./plot.js";
 import * as state from "./state.js";
 import {
-  announce, button, details, duration, el, field, fill, jobView, number, selectField, size, table, textField,
+  announce,
+  button,
+  details,
+  duration,
+  el,
+  field,
+  fill,
+  jobView,
+  number,
+  selectField,
+  size,
+  table,
+  textField,
 } from "./ui.js";
 
 /** Keys of the view that say how a log is read. */
@@ -18,7 +30,9 @@ export function reading(whole = false) {
   const out = {};
   for (const key of READING) {
     const value = state.get(key);
-    if (value) out[key] = key === "columns" ? value.split(",").map((name) => name.trim()) : key === "rate" ? Number(value) : value;
+    if (value)
+      out[key] =
+        key === "columns" ? value.split(",").map((name) => name.trim()) : key === "rate" ? Number(value) : value;
   }
   if (!whole && state.get("from")) out.start = `${state.get("from")}s`;
   if (!whole && state.get("to")) out.end = `${state.get("to")}s`;
@@ -58,21 +72,48 @@ export const panel = {
     let view = null;
 
     const offer = el("section");
-    const logs = selectField("Log", [], { onchange: (log) => ctx.open("log", { log, from: null, to: null, ...none() }) });
+    const logs = selectField("Log", [], {
+      onchange: (log) => ctx.open("log", { log, from: null, to: null, ...none() }),
+    });
     const file = el("input", { type: "file", multiple: true, onchange: add });
     const job = jobView();
     const facts = el("p");
     const problem = el("p", { className: "error", role: "alert", hidden: true });
     const topic = selectField("Topic", [], { onchange: (value) => again({ topic: value }) });
     topic.hidden = true;
-    const unit = textField("Unit of the values", { placeholder: "deg/s", onchange: (value) => again({ unit: value }),
-      hint: "Units are never guessed: the header says them, or you do." });
-    const units = el("datalist", { id: "units" }, UNITS.map((value) => el("option", { value })));
+    const unit = textField("Unit of the values", {
+      placeholder: "deg/s",
+      onchange: (value) => again({ unit: value }),
+      hint: "Units are never guessed: the header says them, or you do.",
+    });
+    const units = el(
+      "datalist",
+      { id: "units" },
+      UNITS.map((value) => el("option", { value })),
+    );
     unit.input.setAttribute("list", units.id);
-    const rate = textField("Sample rate, Hz", { onchange: (value) => again({ rate: value }), hint: "Only without a time column." });
-    const columns = textField("Columns", { placeholder: "found by name", onchange: (value) => again({ columns: value }), hint: "Names or numbers, with commas." });
-    const time = textField("Time column", { placeholder: "found by name", onchange: (value) => again({ time: value }) });
-    const sensor = selectField("Sensor", [["", "the one there is"], ["gyro", "gyro"], ["accel", "accelerometer"]], { onchange: (value) => again({ sensor: value }) });
+    const rate = textField("Sample rate, Hz", {
+      onchange: (value) => again({ rate: value }),
+      hint: "Only without a time column.",
+    });
+    const columns = textField("Columns", {
+      placeholder: "found by name",
+      onchange: (value) => again({ columns: value }),
+      hint: "Names or numbers, with commas.",
+    });
+    const time = textField("Time column", {
+      placeholder: "found by name",
+      onchange: (value) => again({ time: value }),
+    });
+    const sensor = selectField(
+      "Sensor",
+      [
+        ["", "the one there is"],
+        ["gyro", "gyro"],
+        ["accel", "accelerometer"],
+      ],
+      { onchange: (value) => again({ sensor: value }) },
+    );
     const how = details("How the log is read", topic, unit, units, sensor, columns, time, rate);
 
     const from = textField("From, s", { placeholder: "start", size: 9, onchange: () => typed() });
@@ -85,18 +126,39 @@ export const panel = {
     const findings = el("section");
     const plots = el("div");
 
-    const chosen = el("section", { hidden: true },
+    const chosen = el(
+      "section",
+      { hidden: true },
       el("h2", null, "The part that counts"),
       el("p", { className: "hint" }, "Drag over a trace, or type seconds from the start of the log."),
       el("div", { className: "row" }, from, to),
       el("div", { className: "row" }, calm, zoom, whole, clear),
-      el("div", { className: "row" }, next));
-    fill(root,
-      el("div", { className: "controls" }, offer,
-        el("section", null, logs, field("Add files", file, "Or drop them on the page. They are copied into the folder."), problem, facts, how), chosen, job),
-      el("div", { className: "figures" }, plots, findings));
+      el("div", { className: "row" }, next),
+    );
+    fill(
+      root,
+      el(
+        "div",
+        { className: "controls" },
+        offer,
+        el(
+          "section",
+          null,
+          logs,
+          field("Add files", file, "Or drop them on the page. They are copied into the folder."),
+          problem,
+          facts,
+          how,
+        ),
+        chosen,
+        job,
+      ),
+      el("div", { className: "figures" }, plots, findings),
+    );
 
-    function none() { return Object.fromEntries(READING.map((key) => [key, null])); }
+    function none() {
+      return Object.fromEntries(READING.map((key) => [key, null]));
+    }
 
     /** @param {Record<string, any>} values */
     function again(values) {
@@ -126,8 +188,11 @@ export const panel = {
 
     async function example() {
       try {
-        await api.run("simulate", { params: "draft:example", output: EXAMPLE_LOG, duration: EXAMPLE_LENGTH, no_truth: true },
-          { drafts: { example: EXAMPLE }, onJob: job.update });
+        await api.run(
+          "simulate",
+          { params: "draft:example", output: EXAMPLE_LOG, duration: EXAMPLE_LENGTH, no_truth: true },
+          { drafts: { example: EXAMPLE }, onJob: job.update },
+        );
         await ctx.refresh();
         ctx.open("log", { log: EXAMPLE_LOG });
       } catch (error) {
@@ -138,16 +203,35 @@ export const panel = {
     function list() {
       const found = ctx.project.files.filter(({ kind }) => kind === "log");
       const log = state.get("log") || (found.length === 1 ? found[0].name : "");
-      logs.set([["", found.length ? "choose a log" : "no log yet"],
-        ...found.map((it) => /** @type {[string, string]} */ ([it.name, `${it.name} (${size(it.size)})`]))], log);
+      logs.set(
+        [
+          ["", found.length ? "choose a log" : "no log yet"],
+          ...found.map((it) => /** @type {[string, string]} */ ([it.name, `${it.name} (${size(it.size)})`])),
+        ],
+        log,
+      );
       logs.hidden = found.length === 0;
       file.disabled = ctx.project.read_only;
-      const start = el("div", { className: "row" },
-        ctx.project.read_only || found.some(({ name }) => name === EXAMPLE_LOG) ? null : button("Simulate an example", example, { className: found.length ? "" : "main" }),
-        button("Tour of a minute", () => ctx.tour()));
-      fill(offer, found.length ? null : el("h2", null, "No log in this folder yet"),
-        found.length ? null : el("p", null, "Add a log of your sensor at rest, or begin with a simulated one: a MEMS gyro of three axes, 2 h at 100 Hz."),
-        state.get("log") && found.length ? null : start);
+      const start = el(
+        "div",
+        { className: "row" },
+        ctx.project.read_only || found.some(({ name }) => name === EXAMPLE_LOG)
+          ? null
+          : button("Simulate an example", example, { className: found.length ? "" : "main" }),
+        button("Tour of a minute", () => ctx.tour()),
+      );
+      fill(
+        offer,
+        found.length ? null : el("h2", null, "No log in this folder yet"),
+        found.length
+          ? null
+          : el(
+              "p",
+              null,
+              "Add a log of your sensor at rest, or begin with a simulated one: a MEMS gyro of three axes, 2 h at 100 Hz.",
+            ),
+        state.get("log") && found.length ? null : start,
+      );
       if (log && !state.get("log")) state.set({ log });
     }
 
@@ -181,7 +265,9 @@ export const panel = {
       zoom.disabled = !part;
       clear.disabled = !part;
       whole.disabled = !view;
-      traces.forEach((trace, axis) => trace.set(seen[axis] ?? [], { marks: marks(axis), xRange: view ?? [0, head?.seconds ?? 1] }));
+      traces.forEach((trace, axis) =>
+        trace.set(seen[axis] ?? [], { marks: marks(axis), xRange: view ?? [0, head?.seconds ?? 1] }),
+      );
     }
 
     /** @type {import("./plot.js").Line[][]} */
@@ -191,7 +277,9 @@ export const panel = {
     function marks(axis) {
       if (!head) return [];
       const name = head.axes[axis];
-      const found = head.check.findings.filter((/** @type {any} */ f) => f.kind !== "calm" && f.first_s > 0 && (f.axis === null || f.axis === name));
+      const found = head.check.findings.filter(
+        (/** @type {any} */ f) => f.kind !== "calm" && f.first_s > 0 && (f.axis === null || f.axis === name),
+      );
       /** @type {import("./plot.js").Mark[]} */
       const out = found.map((/** @type {any} */ f) => ({ x: f.first_s, text: f.message, serious: f.serious }));
       const part = range();
@@ -207,16 +295,29 @@ export const panel = {
 
     const fetched = api.latest(
       (/** @type {{log: string, whole: any, n: number, part: [number, number] | null, points: number}} */ it) =>
-        Promise.all(Array.from({ length: it.n }, (_, axis) => api.series(it.log,
-          { axis, from: it.part?.[0], to: it.part?.[1], points: it.points, reading: it.whole }))),
+        Promise.all(
+          Array.from({ length: it.n }, (_, axis) =>
+            api.series(it.log, { axis, from: it.part?.[0], to: it.part?.[1], points: it.points, reading: it.whole }),
+          ),
+        ),
       (all) => {
-        seen = all.map(({ x, low, high }, axis) => [{ name: head?.axes[axis] ?? "", x, y: low, low, high, kind: "band", colour: 1 }]);
+        seen = all.map(({ x, low, high }, axis) => [
+          { name: head?.axes[axis] ?? "", x, y: low, low, high, kind: "band", colour: 1 },
+        ]);
         showRange();
-      }, fail);
+      },
+      fail,
+    );
 
     function trace() {
       if (!head || !traces.length) return;
-      fetched({ log: state.get("log"), whole: reading(true), n: traces.length, part: view, points: Math.max(200, traces[0].width() - 70) });
+      fetched({
+        log: state.get("log"),
+        whole: reading(true),
+        n: traces.length,
+        part: view,
+        points: Math.max(200, traces[0].width() - 70),
+      });
     }
 
     function calmPart() {
@@ -224,7 +325,10 @@ export const panel = {
       calm.hidden = !found;
       if (!found || !head) return;
       // the check gives its first sample and how many
-      const [a, b] = [Math.ceil(found.first_s * 10) / 10, Math.floor((found.first_s + found.count / head.rate) * 10) / 10];
+      const [a, b] = [
+        Math.ceil(found.first_s * 10) / 10,
+        Math.floor((found.first_s + found.count / head.rate) * 10) / 10,
+      ];
       const end = b >= head.seconds - 0.1 ? null : b;
       calm.textContent = `Take the calm part: ${number(a)} s to ${end === null ? "the end" : `${number(b)} s`}`;
       calm.onclick = () => setRange(a > 0 ? a : null, end);
@@ -233,7 +337,13 @@ export const panel = {
     async function open() {
       const log = state.get("log");
       const key = JSON.stringify([log, reading(true), ctx.project.files.find(({ name }) => name === log)?.modified]);
-      for (const [part, name] of /** @type {[any, string][]} */ ([[unit, "unit"], [rate, "rate"], [columns, "columns"], [time, "time"], [sensor, "sensor"]])) {
+      for (const [part, name] of /** @type {[any, string][]} */ ([
+        [unit, "unit"],
+        [rate, "rate"],
+        [columns, "columns"],
+        [time, "time"],
+        [sensor, "sensor"],
+      ])) {
         part.input.value = state.get(name);
       }
       if (key === drawn) return showRange();
@@ -272,19 +382,43 @@ export const panel = {
       facts.textContent = `${check.samples} samples, ${number(hz)} Hz, ${duration(seconds)}, ${axes.length} ${axes.length === 1 ? "axis" : "axes"} in ${shown}`;
       announce(facts.textContent);
       chosen.hidden = false;
-      traces = axes.slice(0, MOST_AXES).map((/** @type {string} */ name, /** @type {number} */ i, /** @type {string[]} */ all) => figure({
-        title: name, x: "time from the start (s)", bare: i + 1 < all.length, y: shown, height: i + 1 < all.length ? 150 : 170, sync: "log", legend: false,
-        onRange: (a, b) => setRange(Math.max(0, Number(a.toPrecision(5))), Number(Math.min(b, seconds).toPrecision(5))),
-        onReset: () => setRange(null, null), onSize: trace,
-      }));
+      traces = axes
+        .slice(0, MOST_AXES)
+        .map((/** @type {string} */ name, /** @type {number} */ i, /** @type {string[]} */ all) =>
+          figure({
+            title: name,
+            x: "time from the start (s)",
+            bare: i + 1 < all.length,
+            y: shown,
+            height: i + 1 < all.length ? 150 : 170,
+            sync: "log",
+            legend: false,
+            onRange: (a, b) =>
+              setRange(Math.max(0, Number(a.toPrecision(5))), Number(Math.min(b, seconds).toPrecision(5))),
+            onReset: () => setRange(null, null),
+            onSize: trace,
+          }),
+        );
       fill(plots, traces);
       calmPart();
-      fill(findings, el("h2", null, "What the check found"),
-        check.findings.length === 0 ? el("p", null, "Nothing: no gaps, no repeated or stuck values, no outliers, at rest.")
-          : table({ caption: "findings of the check", visible: false, numeric: false, head: ["Kind", "Axis", "From", "What"],
-            rows: check.findings.map((/** @type {any} */ f) => [
-              el("span", { className: f.serious ? "bad" : "" }, f.serious ? `${f.kind}, serious` : f.kind),
-              f.axis ?? "all", f.first_s > 0 ? `${number(f.first_s)} s` : "", f.message.replace(/`(start|end)`/g, "$1")]) }));
+      fill(
+        findings,
+        el("h2", null, "What the check found"),
+        check.findings.length === 0
+          ? el("p", null, "Nothing: no gaps, no repeated or stuck values, no outliers, at rest.")
+          : table({
+              caption: "findings of the check",
+              visible: false,
+              numeric: false,
+              head: ["Kind", "Axis", "From", "What"],
+              rows: check.findings.map((/** @type {any} */ f) => [
+                el("span", { className: f.serious ? "bad" : "" }, f.serious ? `${f.kind}, serious` : f.kind),
+                f.axis ?? "all",
+                f.first_s > 0 ? `${number(f.first_s)} s` : "",
+                f.message.replace(/`(start|end)`/g, "$1"),
+              ]),
+            }),
+      );
       trace();
     }
 
@@ -295,15 +429,26 @@ export const panel = {
         const info = await api.document_(job.id);
         const tables = info.topics.filter((/** @type {any} */ it) => it.name && it.rows > 0);
         topic.hidden = tables.length < 2;
-        topic.set([["", "found by name"], ...tables.map((/** @type {any} */ it) =>
-          [it.name, `${it.name}${it.kind ? `, ${it.kind}` : ""}: ${it.rows} rows${it.rate_hz ? `, ${number(it.rate_hz)} Hz` : ""}`])], state.get("topic"));
+        topic.set(
+          [
+            ["", "found by name"],
+            ...tables.map((/** @type {any} */ it) => [
+              it.name,
+              `${it.name}${it.kind ? `, ${it.kind}` : ""}: ${it.rows} rows${it.rate_hz ? `, ${number(it.rate_hz)} Hz` : ""}`,
+            ]),
+          ],
+          state.get("topic"),
+        );
       } catch {
         // the reading itself says what is wrong with the file
         topic.hidden = true;
       }
     }
 
-    const fresh = () => { list(); open(); };
+    const fresh = () => {
+      list();
+      open();
+    };
     fresh();
     return fresh;
   },

@@ -27,7 +27,12 @@ export const DASHES = [[], [8, 4], [2, 3], [10, 3, 2, 3], [14, 4], [5, 2, 1, 2, 
 const colour = (n, alpha = 1) => {
   const style = getComputedStyle(document.documentElement);
   const plain = style.getPropertyValue(n ? `--line-${((n - 1) % 6) + 1}` : "--text").trim();
-  return alpha === 1 ? plain : plain + Math.round(255 * alpha).toString(16).padStart(2, "0");
+  return alpha === 1
+    ? plain
+    : plain +
+        Math.round(255 * alpha)
+          .toString(16)
+          .padStart(2, "0");
 };
 const ruled = () => getComputedStyle(document.documentElement).getPropertyValue("--rule").trim();
 
@@ -35,12 +40,13 @@ const SVG = "http://www.w3.org/2000/svg";
 /** A line as the figure draws it. @param {Line} line */
 function sample(line) {
   const svg = document.createElementNS(SVG, "svg");
-  for (const [key, value] of Object.entries({ width: "28", height: "10", "aria-hidden": "true", class: "sample" })) svg.setAttribute(key, value);
+  for (const [key, value] of Object.entries({ width: "28", height: "10", "aria-hidden": "true", class: "sample" }))
+    svg.setAttribute(key, value);
   const stroke = document.createElementNS(SVG, "path");
   const dots = line.kind === "points";
   stroke.setAttribute("d", dots ? "M14 2v6" : "M0 5h28");
   stroke.setAttribute("class", line.colour ? `line-${((line.colour - 1) % 6) + 1}` : "line-0");
-  stroke.setAttribute("stroke-width", dots ? "4" : `${line.kind === "band" ? 8 : line.width ?? 1.5}`);
+  stroke.setAttribute("stroke-width", dots ? "4" : `${line.kind === "band" ? 8 : (line.width ?? 1.5)}`);
   if (line.kind === "band") stroke.setAttribute("opacity", "0.35");
   stroke.setAttribute("stroke-dasharray", (DASHES[line.dash ?? 0] ?? []).join(" "));
   svg.append(stroke);
@@ -62,7 +68,10 @@ const short = (v) => number(v, 6);
 function joined(lines) {
   const same = lines.every((line) => line.x === lines[0].x);
   if (same) return [lines[0].x, ...lines.map((line) => line.y)];
-  return UPlot.join(lines.map((line) => [line.x, line.y]), lines.map(() => lines.map(() => 0)));
+  return UPlot.join(
+    lines.map((line) => [line.x, line.y]),
+    lines.map(() => lines.map(() => 0)),
+  );
 }
 
 /** @param {Keys} keys */
@@ -71,7 +80,15 @@ export function figure(keys) {
   const legend = el("ul", { className: "legend" });
   const marksList = el("ul", { className: "hidden" });
   const rows = details("Table");
-  const root = el("figure", null, el("figcaption", null, keys.title), legend, el("div", { className: "frame" }, place), marksList, rows);
+  const root = el(
+    "figure",
+    null,
+    el("figcaption", null, keys.title),
+    legend,
+    el("div", { className: "frame" }, place),
+    marksList,
+    rows,
+  );
   /** @type {Line[]} */
   let lines = [];
   /** @type {Mark[]} */
@@ -119,9 +136,12 @@ export function figure(keys) {
       if (low[i] === null || high[i] === null) continue;
       const x = pos(u, line.x[i], "x");
       const [a, b] = [pos(u, low[i], "y"), pos(u, high[i], "y")];
-      c.moveTo(x, a); c.lineTo(x, b);
-      c.moveTo(x - cap, a); c.lineTo(x + cap, a);
-      c.moveTo(x - cap, b); c.lineTo(x + cap, b);
+      c.moveTo(x, a);
+      c.lineTo(x, b);
+      c.moveTo(x - cap, a);
+      c.lineTo(x + cap, a);
+      c.moveTo(x - cap, b);
+      c.lineTo(x + cap, b);
     }
     c.stroke();
   }
@@ -189,41 +209,63 @@ export function figure(keys) {
     const font = `12px ${getComputedStyle(document.body).fontFamily}`;
     /** @param {string | undefined} label @param {boolean} log @param {boolean} upright */
     const axis = (label, log, upright) => ({
-      label, font, labelFont: font, stroke: () => colour(0), size: upright ? 58 : 30, labelSize: 20, labelGap: 0, ...(upright ? { space: 24 } : {}),
-      grid: { stroke: ruled, width: 1 }, ticks: { stroke: ruled, width: 1, size: 4 },
+      label,
+      font,
+      labelFont: font,
+      stroke: () => colour(0),
+      size: upright ? 58 : 30,
+      labelSize: 20,
+      labelGap: 0,
+      ...(upright ? { space: 24 } : {}),
+      grid: { stroke: ruled, width: 1 },
+      ticks: { stroke: ruled, width: 1, size: 4 },
       values: log ? decades : (/** @type {any} */ _u, /** @type {number[]} */ v) => v.map(short),
       ...(log ? { filter: (/** @type {any} */ _u, /** @type {any} */ s) => s } : {}),
     });
-    u = new UPlot({
-      width: width(), height: height(), legend: { show: false },
-      scales: {
-        x: { time: false, distr: keys.xLog ? 3 : 1, range: () => xRange() },
-        y: { distr: keys.yLog ? 3 : 1, range: () => yRange() },
+    u = new UPlot(
+      {
+        width: width(),
+        height: height(),
+        legend: { show: false },
+        scales: {
+          x: { time: false, distr: keys.xLog ? 3 : 1, range: () => xRange() },
+          y: { distr: keys.yLog ? 3 : 1, range: () => yRange() },
+        },
+        axes: [axis(keys.bare ? undefined : keys.x, !!keys.xLog, false), axis(keys.y, !!keys.yLog, true)],
+        cursor: {
+          drag: { x: !!keys.onRange, y: false, setScale: false },
+          sync: keys.sync ? { key: keys.sync } : undefined,
+          points: { size: 6 },
+        },
+        series: [
+          {},
+          ...lines.map((line) => ({
+            label: line.name,
+            spanGaps: true,
+            width: line.kind === "points" || line.kind === "band" ? 0 : (line.width ?? 1.5),
+            stroke: () => colour(line.colour ?? 0),
+            dash: DASHES[line.dash ?? 0],
+            points: { show: line.kind === "points", size: 5, fill: () => colour(line.colour ?? 0) },
+            ...(line.kind === "points" || line.kind === "band" ? { paths: () => null } : {}),
+            ...(line.kind === "steps" ? { paths: UPlot.paths.stepped({ align: 1 }) } : {}),
+          })),
+        ],
+        hooks: {
+          drawAxes: [below],
+          draw: [settle],
+          setCursor: [read],
+          setSelect: [
+            (/** @type {any} */ u) => {
+              const [a, b] = [u.posToVal(u.select.left, "x"), u.posToVal(u.select.left + u.select.width, "x")];
+              if (u.select.width > 4) keys.onRange?.(a, b);
+              u.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+            },
+          ],
+        },
       },
-      axes: [axis(keys.bare ? undefined : keys.x, !!keys.xLog, false), axis(keys.y, !!keys.yLog, true)],
-      cursor: {
-        drag: { x: !!keys.onRange, y: false, setScale: false },
-        sync: keys.sync ? { key: keys.sync } : undefined,
-        points: { size: 6 },
-      },
-      series: [{}, ...lines.map((line) => ({
-        label: line.name, spanGaps: true, width: line.kind === "points" || line.kind === "band" ? 0 : line.width ?? 1.5,
-        stroke: () => colour(line.colour ?? 0), dash: DASHES[line.dash ?? 0],
-        points: { show: line.kind === "points", size: 5, fill: () => colour(line.colour ?? 0) },
-        ...(line.kind === "points" || line.kind === "band" ? { paths: () => null } : {}),
-        ...(line.kind === "steps" ? { paths: UPlot.paths.stepped({ align: 1 }) } : {}),
-      }))],
-      hooks: {
-        drawAxes: [below],
-        draw: [settle],
-        setCursor: [read],
-        setSelect: [(/** @type {any} */ u) => {
-          const [a, b] = [u.posToVal(u.select.left, "x"), u.posToVal(u.select.left + u.select.width, "x")];
-          if (u.select.width > 4) keys.onRange?.(a, b);
-          u.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
-        }],
-      },
-    }, joined(lines), place);
+      joined(lines),
+      place,
+    );
     u.over.addEventListener("dblclick", () => keys.onReset?.());
     handles.forEach((handle) => u.over.append(handle.node));
     settle();
@@ -235,11 +277,16 @@ export function figure(keys) {
     readings.forEach((place, i) => {
       const at = u.cursor.idx;
       const line = lines[i];
-      if (!line || at === null || at === undefined) { place.textContent = ""; return; }
+      if (!line || at === null || at === undefined) {
+        place.textContent = "";
+        return;
+      }
       const x = u.data[0][at];
       let near = 0;
       while (near + 1 < line.x.length && Math.abs(line.x[near + 1] - x) <= Math.abs(line.x[near] - x)) near++;
-      place.textContent = line.x.length ? number(line.kind === "band" && line.high ? line.high[near] : line.y[near]) : "";
+      place.textContent = line.x.length
+        ? number(line.kind === "band" && line.high ? line.high[near] : line.y[near])
+        : "";
     });
   }
 
@@ -264,7 +311,12 @@ export function figure(keys) {
 
   /** @param {Handle} given */
   function grip(given) {
-    const node = el("div", { className: given.sideways ? "handle both" : "handle", role: "slider", tabIndex: 0, "aria-orientation": "vertical" });
+    const node = el("div", {
+      className: given.sideways ? "handle both" : "handle",
+      role: "slider",
+      tabIndex: 0,
+      "aria-orientation": "vertical",
+    });
     const handle = Object.assign({}, given, { node });
     describe(node, given);
     let moved = false;
@@ -275,7 +327,10 @@ export function figure(keys) {
       settle();
       handle.onMove(to);
     };
-    const done = () => { if (moved) handle.onDone?.(); moved = false; };
+    const done = () => {
+      if (moved) handle.onDone?.();
+      moved = false;
+    };
     node.addEventListener("pointerdown", (e) => {
       e.preventDefault();
       e.stopPropagation();
@@ -295,14 +350,22 @@ export function figure(keys) {
       // a step is 2 %, with Shift 20 %
       const step = e.shiftKey ? 1.2 : 1.02;
       /** @type {Record<string, [number, number]>} */
-      const ways = { ArrowUp: [1, step], ArrowDown: [1, 1 / step], PageUp: [1, 1.2], PageDown: [1, 1 / 1.2],
-        ArrowRight: handle.sideways ? [step, 1] : [1, step], ArrowLeft: handle.sideways ? [1 / step, 1] : [1, 1 / step] };
+      const ways = {
+        ArrowUp: [1, step],
+        ArrowDown: [1, 1 / step],
+        PageUp: [1, 1.2],
+        PageDown: [1, 1 / 1.2],
+        ArrowRight: handle.sideways ? [step, 1] : [1, step],
+        ArrowLeft: handle.sideways ? [1 / step, 1] : [1, 1 / step],
+      };
       const way = ways[e.key];
       if (!way) return;
       e.preventDefault();
       move({ x: handle.x * way[0], y: handle.y * way[1] });
     });
-    node.addEventListener("keyup", (e) => { if (e.key.startsWith("Arrow") || e.key.startsWith("Page")) done(); });
+    node.addEventListener("keyup", (e) => {
+      if (e.key.startsWith("Arrow") || e.key.startsWith("Page")) done();
+    });
     node.addEventListener("blur", done);
     return handle;
   }
@@ -310,8 +373,14 @@ export function figure(keys) {
   function drawLegend() {
     readings = lines.map(() => el("span", { className: "value" }));
     if (keys.legend === false) return;
-    fill(legend, lines.map((line, i) => (line.faint && line.colour === undefined ? null
-      : el("li", null, /** @type {any} */ (sample(line)), line.name, readings[i]))));
+    fill(
+      legend,
+      lines.map((line, i) =>
+        line.faint && line.colour === undefined
+          ? null
+          : el("li", null, /** @type {any} */ (sample(line)), line.name, readings[i]),
+      ),
+    );
   }
 
   // filled when it is opened: a table of ten thousand rows that nobody reads costs time
@@ -319,17 +388,36 @@ export function figure(keys) {
     if (!rows.open) return;
     const most = 2000;
     const parts = lines.map((line) => {
-      const cells = Array.from({ length: Math.min(line.x.length, most) }, (_, i) =>
-        [number(line.x[i], 6), ...(line.kind === "band" ? [] : [number(line.y[i], 6)]), ...(line.low && line.high ? [number(line.low[i], 6), number(line.high[i], 6)] : [])]);
+      const cells = Array.from({ length: Math.min(line.x.length, most) }, (_, i) => [
+        number(line.x[i], 6),
+        ...(line.kind === "band" ? [] : [number(line.y[i], 6)]),
+        ...(line.low && line.high ? [number(line.low[i], 6), number(line.high[i], 6)] : []),
+      ]);
       const ends = line.kind === "points" ? ["lower (95 %)", "upper (95 %)"] : ["least", "greatest"];
       const head = [keys.x, ...(line.kind === "band" ? [] : [keys.y]), ...(line.low && line.high ? ends : [])];
       return table({ caption: line.name, head, rows: cells });
     });
     const csv = button("Download CSV", async () => {
-      const text = lines.map((line) => [`# ${line.name}`, ...Array.from(line.x, (x, i) => [x, line.y[i], line.low?.[i], line.high?.[i]].filter((v) => v !== undefined).join(","))].join("\n")).join("\n");
-      (await import("./ui.js")).download(`${keys.title.replace(/[^A-Za-z0-9]+/g, "-")}.csv`, new Blob([text + "\n"], { type: "text/csv" }));
+      const text = lines
+        .map((line) =>
+          [
+            `# ${line.name}`,
+            ...Array.from(line.x, (x, i) =>
+              [x, line.y[i], line.low?.[i], line.high?.[i]].filter((v) => v !== undefined).join(","),
+            ),
+          ].join("\n"),
+        )
+        .join("\n");
+      (await import("./ui.js")).download(
+        `${keys.title.replace(/[^A-Za-z0-9]+/g, "-")}.csv`,
+        new Blob([text + "\n"], { type: "text/csv" }),
+      );
     });
-    rows.replaceChildren(/** @type {Element} */ (rows.firstElementChild), csv, el("div", { className: "columns" }, parts));
+    rows.replaceChildren(
+      /** @type {Element} */ (rows.firstElementChild),
+      csv,
+      el("div", { className: "columns" }, parts),
+    );
   });
 
   const resized = new ResizeObserver(() => {
@@ -349,16 +437,30 @@ export function figure(keys) {
       lines = next.filter((line) => line.x.length);
       if (more.marks) {
         marks = more.marks;
-        fill(marksList, marks.map((mark) => el("li", null, mark.text)));
+        fill(
+          marksList,
+          marks.map((mark) => el("li", null, mark.text)),
+        );
       }
       if ("xRange" in more) keys.xRange = more.xRange;
       if ("yRange" in more) keys.yRange = more.yRange;
-      const now = JSON.stringify(lines.map(({ name, kind, colour, dash, width, faint }) => [name, kind, colour, dash, width, faint]));
-      if (lines.length === 0) { u?.destroy(); u = null; shape = ""; fill(legend); return; }
+      const now = JSON.stringify(
+        lines.map(({ name, kind, colour, dash, width, faint }) => [name, kind, colour, dash, width, faint]),
+      );
+      if (lines.length === 0) {
+        u?.destroy();
+        u = null;
+        shape = "";
+        fill(legend);
+        return;
+      }
       if (now !== shape) drawLegend();
       if (u && now === shape && place.isConnected) u.setData(joined(lines));
       else if (place.isConnected && place.clientWidth) build();
-      else requestAnimationFrame(() => { if (place.isConnected) build(); });
+      else
+        requestAnimationFrame(() => {
+          if (place.isConnected) build();
+        });
       shape = now;
       rows.open = false;
     },
@@ -368,7 +470,11 @@ export function figure(keys) {
       handles.filter((old) => !next.some((it) => it.name === old.name)).forEach((old) => old.node.remove());
       handles = next.map((given) => {
         const old = known.get(given.name);
-        if (!old) { const made = grip(given); u?.over.append(made.node); return made; }
+        if (!old) {
+          const made = grip(given);
+          u?.over.append(made.node);
+          return made;
+        }
         Object.assign(old, given);
         describe(old.node, given);
         return old;
@@ -393,10 +499,28 @@ export function figure(keys) {
 
 /** Shares of a whole as bars with numbers. @param {string} title @param {{name: string, share: number}[]} parts */
 export function budget(title, parts) {
-  return el("figure", { className: "budget" }, el("figcaption", null, title),
-    el("table", { className: "numeric" }, el("tbody", null, parts.map(({ name, share }) => {
-      const bar = el("span", { className: "bar" });
-      bar.style.width = `${100 * share}%`;
-      return el("tr", null, el("th", { scope: "row" }, name), el("td", null, `${number(100 * share, 3)} %`), el("td", { className: "bars", "aria-hidden": "true" }, bar));
-    }))));
+  return el(
+    "figure",
+    { className: "budget" },
+    el("figcaption", null, title),
+    el(
+      "table",
+      { className: "numeric" },
+      el(
+        "tbody",
+        null,
+        parts.map(({ name, share }) => {
+          const bar = el("span", { className: "bar" });
+          bar.style.width = `${100 * share}%`;
+          return el(
+            "tr",
+            null,
+            el("th", { scope: "row" }, name),
+            el("td", null, `${number(100 * share, 3)} %`),
+            el("td", { className: "bars", "aria-hidden": "true" }, bar),
+          );
+        }),
+      ),
+    ),
+  );
 }

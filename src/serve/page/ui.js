@@ -12,7 +12,8 @@ export function el(tag, keys, ...children) {
   for (const [key, value] of Object.entries(keys ?? {})) {
     if (value === undefined || value === null || value === false) continue;
     if (key.startsWith("on")) out.addEventListener(key.slice(2), value);
-    else if (key in out && !key.includes("-") && key !== "list" && key !== "form") /** @type {any} */ (out)[key] = value;
+    else if (key in out && !key.includes("-") && key !== "list" && key !== "form")
+      /** @type {any} */ (out)[key] = value;
     else out.setAttribute(key === "className" ? "class" : key, value === true ? "" : `${value}`);
   }
   fill(out, ...children);
@@ -34,9 +35,13 @@ export function number(value, digits = 4) {
   if (value === null || value === undefined || Number.isNaN(value)) return "–";
   if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
   const size = Math.abs(value);
-  const text = size !== 0 && (size < 1e-4 || size >= 1e6)
-    ? value.toExponential(Math.max(digits - 1, 0)).replace(/\.?0+e/, "e").replace("e+", "e")
-    : `${Number(value.toPrecision(digits))}`;
+  const text =
+    size !== 0 && (size < 1e-4 || size >= 1e6)
+      ? value
+          .toExponential(Math.max(digits - 1, 0))
+          .replace(/\.?0+e/, "e")
+          .replace("e+", "e")
+      : `${Number(value.toPrecision(digits))}`;
   return text.replace("-", "−");
 }
 
@@ -55,7 +60,8 @@ export const size = (bytes) =>
 export const unitText = (text) => text.replace(/sqrt\((\w+)\)/g, "√$1").replace("^2", "²");
 
 /** A value with its unit, as documents hold it. @param {any} measured @param {number} [digits] */
-export const measured = (measured, digits) => (measured ? `${number(measured.value, digits)} ${unitText(measured.unit)}` : "–");
+export const measured = (measured, digits) =>
+  measured ? `${number(measured.value, digits)} ${unitText(measured.unit)}` : "–";
 
 // ---------------------------------------------------------------------------------------------- what is announced
 
@@ -66,10 +72,13 @@ export function announce(words) {
   const place = document.getElementById("status");
   if (!place || place.textContent === words) return;
   clearTimeout(pending);
-  pending = window.setTimeout(() => {
-    said = Date.now();
-    place.textContent = words;
-  }, Math.max(0, 1000 - (Date.now() - said)));
+  pending = window.setTimeout(
+    () => {
+      said = Date.now();
+      place.textContent = words;
+    },
+    Math.max(0, 1000 - (Date.now() - said)),
+  );
 }
 
 // ---------------------------------------------------------------------------------------------------------- fields
@@ -98,7 +107,10 @@ export function selectField(label, options, keys = {}) {
   const root = field(label, input, keys.hint);
   /** @param {(string | [string, string])[]} options @param {string} [value] */
   const set = (options, value = input.value) => {
-    fill(input, options.map((it) => (typeof it === "string" ? [it, it] : it)).map(([v, t]) => el("option", { value: v }, t)));
+    fill(
+      input,
+      options.map((it) => (typeof it === "string" ? [it, it] : it)).map(([v, t]) => el("option", { value: v }, t)),
+    );
     if (options.some((it) => (typeof it === "string" ? it : it[0]) === value)) input.value = value;
   };
   set(options, keys.value);
@@ -107,7 +119,12 @@ export function selectField(label, options, keys = {}) {
 
 /** @param {string} label @param {boolean} checked @param {(checked: boolean) => void} [onchange] */
 export function checkField(label, checked, onchange) {
-  const input = el("input", { type: "checkbox", checked, id: unique("check"), onchange: () => onchange?.(input.checked) });
+  const input = el("input", {
+    type: "checkbox",
+    checked,
+    id: unique("check"),
+    onchange: () => onchange?.(input.checked),
+  });
   return Object.assign(el("div", { className: "check" }, input, el("label", { htmlFor: input.id }, label)), { input });
 }
 
@@ -134,7 +151,12 @@ export function slider(keys) {
   /** @param {number} s */
   const at = (s) => (log ? min * (max / min) ** s : min + s * (max - min));
   const name = unique("slider");
-  const box = el("input", { type: "text", inputmode: "decimal", className: "number", "aria-label": `${label}, ${unit}` });
+  const box = el("input", {
+    type: "text",
+    inputmode: "decimal",
+    className: "number",
+    "aria-label": `${label}, ${unit}`,
+  });
   const range = el("input", { type: "range", min: "0", max: `${STEPS}`, step: "1", "aria-labelledby": name });
   const band = el("span", { className: "interval" });
   const note = el("span", { className: "outside" });
@@ -179,22 +201,34 @@ export function slider(keys) {
   });
   /** @type {HTMLInputElement | null} */
   const lock = keys.onLock
-    ? el("input", { type: "checkbox", checked: !!keys.locked, "aria-label": `hold ${label}`,
-      onchange: (/** @type {Event} */ e) => keys.onLock?.(/** @type {HTMLInputElement} */ (e.target).checked) })
+    ? el("input", {
+        type: "checkbox",
+        checked: !!keys.locked,
+        "aria-label": `hold ${label}`,
+        onchange: (/** @type {Event} */ e) => keys.onLock?.(/** @type {HTMLInputElement} */ (e.target).checked),
+      })
     : null;
   drawBand();
   draw();
-  const root = el("div", { className: "slider" },
+  const root = el(
+    "div",
+    { className: "slider" },
     el("span", { className: "name", id: name }, label),
     el("span", { className: "amount" }, box, el("span", { className: "unit" }, unit)),
     el("span", { className: lock ? "track" : "track alone" }, band, range),
     lock && el("label", { className: "lock" }, lock, "hold"),
-    note);
+    note,
+  );
   return Object.assign(root, {
-    range, box, lock,
+    range,
+    box,
+    lock,
     get: () => value,
     /** Without telling anyone. @param {number} v */
-    put(v) { value = v; draw(); },
+    put(v) {
+      value = v;
+      draw();
+    },
   });
 }
 
@@ -203,12 +237,36 @@ export function slider(keys) {
 /** @param {{caption: string, head: Child[], rows: (Child | Child[])[][], visible?: boolean, numeric?: boolean}} keys
  * numbers are aligned by `numeric` (default); the first cell of a row names it */
 export function table({ caption, head, rows, visible, numeric = true }) {
-  return el("div", { className: "scroll", tabIndex: 0, role: "region", "aria-label": caption },
-    el("table", { className: numeric ? "numeric" : "" },
+  return el(
+    "div",
+    { className: "scroll", tabIndex: 0, role: "region", "aria-label": caption },
+    el(
+      "table",
+      { className: numeric ? "numeric" : "" },
       el("caption", { className: visible === false ? "hidden" : "" }, caption),
-      el("thead", null, el("tr", null, head.map((cell) => el("th", { scope: "col" }, cell)))),
-      el("tbody", null, rows.map(([first, ...rest]) => el("tr", null,
-        el("th", { scope: "row" }, first), rest.map((cell) => el("td", null, cell)))))));
+      el(
+        "thead",
+        null,
+        el(
+          "tr",
+          null,
+          head.map((cell) => el("th", { scope: "col" }, cell)),
+        ),
+      ),
+      el(
+        "tbody",
+        null,
+        rows.map(([first, ...rest]) =>
+          el(
+            "tr",
+            null,
+            el("th", { scope: "row" }, first),
+            rest.map((cell) => el("td", null, cell)),
+          ),
+        ),
+      ),
+    ),
+  );
 }
 
 // ------------------------------------------------------------------------------------------- commands, jobs, files
@@ -216,21 +274,34 @@ export function table({ caption, head, rows, visible, numeric = true }) {
 /** The command that does this, to copy. */
 export function commandLine() {
   const code = el("code", { tabIndex: 0 });
-  const copy = button("Copy", async () => {
-    try {
-      await navigator.clipboard.writeText(code.textContent ?? "");
-      announce("copied");
-      copy.textContent = "Copied";
-    } catch {
-      getSelection()?.selectAllChildren(code);
-      copy.textContent = "Press Ctrl-C";
-    }
-    setTimeout(() => (copy.textContent = "Copy"), 2000);
-  }, { "aria-label": "Copy the command" });
-  const root = el("div", { className: "command", hidden: true }, el("span", { className: "hint" }, "The same on the command line"), code, copy);
+  const copy = button(
+    "Copy",
+    async () => {
+      try {
+        await navigator.clipboard.writeText(code.textContent ?? "");
+        announce("copied");
+        copy.textContent = "Copied";
+      } catch {
+        getSelection()?.selectAllChildren(code);
+        copy.textContent = "Press Ctrl-C";
+      }
+      setTimeout(() => (copy.textContent = "Copy"), 2000);
+    },
+    { "aria-label": "Copy the command" },
+  );
+  const root = el(
+    "div",
+    { className: "command", hidden: true },
+    el("span", { className: "hint" }, "The same on the command line"),
+    code,
+    copy,
+  );
   return Object.assign(root, {
     /** @param {string} line */
-    set(line) { root.hidden = !line; code.textContent = line; },
+    set(line) {
+      root.hidden = !line;
+      code.textContent = line;
+    },
   });
 }
 
@@ -254,17 +325,28 @@ export function jobView(keys = {}) {
       job = now;
       const going = now.state === "waiting" || now.state === "running";
       running.hidden = !going;
-      if (going && now.parts) { bar.max = now.parts; bar.value = now.done; } else bar.removeAttribute("value");
-      words.textContent = now.state === "waiting" ? "waiting for another job"
-        : `${now.stage || now.command}${now.parts ? ` ${Math.floor((100 * now.done) / now.parts)} %` : ""}`;
+      if (going && now.parts) {
+        bar.max = now.parts;
+        bar.value = now.done;
+      } else bar.removeAttribute("value");
+      words.textContent =
+        now.state === "waiting"
+          ? "waiting for another job"
+          : `${now.stage || now.command}${now.parts ? ` ${Math.floor((100 * now.done) / now.parts)} %` : ""}`;
       if (going) announce(words.textContent);
       else announce(`${now.command}: ${now.state}${now.verdict ? `, ${now.verdict}` : ""}`);
       error.hidden = !now.error;
       error.textContent = now.error ?? "";
-      if (now.state === "stopped") { error.hidden = false; error.textContent = "Stopped."; }
+      if (now.state === "stopped") {
+        error.hidden = false;
+        error.textContent = "Stopped.";
+      }
       const all = [...now.warnings.map((text) => ["warning", text]), ...now.notes.map((text) => ["note", text])];
       notes.hidden = all.length === 0;
-      fill(notes, all.map(([kind, text]) => el("li", { className: kind }, text)));
+      fill(
+        notes,
+        all.map(([kind, text]) => el("li", { className: kind }, text)),
+      );
       brief.hidden = !now.brief;
       brief.textContent = now.brief ?? "";
       command.set(now.shell);
@@ -310,25 +392,54 @@ export function saveAs(label, name, work, done) {
       replace.hidden = over || /** @type {api.ApiError} */ (error).status !== 409;
     }
   }
-  return Object.assign(el("form", { className: "save", onsubmit: (/** @type {Event} */ e) => { e.preventDefault(); go(false); } },
-    el("label", { htmlFor: input.id }, label), input, el("button", { type: "submit" }, "Save"), replace, answer), { input });
+  return Object.assign(
+    el(
+      "form",
+      {
+        className: "save",
+        onsubmit: (/** @type {Event} */ e) => {
+          e.preventDefault();
+          go(false);
+        },
+      },
+      el("label", { htmlFor: input.id }, label),
+      input,
+      el("button", { type: "submit" }, "Save"),
+      replace,
+      answer,
+    ),
+    { input },
+  );
 }
 
 /** What may be taken from a job: into the folder or as a download.
  * @type {Record<string, [string, string]>} what → its name for a person and its ending */
 const PARTS = {
-  document: ["Document", ".json"], page: ["Report", ".html"], figures: ["Figures", ".svg"],
-  full: ["All tables", ".txt"], junit: ["JUnit", ".xml"],
+  document: ["Document", ".json"],
+  page: ["Report", ".html"],
+  figures: ["Figures", ".svg"],
+  full: ["All tables", ".txt"],
+  junit: ["JUnit", ".xml"],
 };
 
 /** @param {api.Job} job @param {{stem: string, file?: string, onSave?: () => void, readOnly?: boolean}} keys
  * `file`: the name under which its file (params.json, filter.json) is offered */
 export function exportMenu(job, keys) {
-  const save = keys.file && job.has.includes("file") && !keys.readOnly
-    ? saveAs("Save", keys.file, (name, replace) => api.saveOf(job.id, { what: "file", name, replace }), keys.onSave) : null;
-  const links = Object.entries(PARTS).filter(([what]) => job.has.includes(what)).map(([what, [name, ending]]) =>
-    el("li", null, el("a", { href: api.href(job.id, what), download: `${keys.stem}${ending}` }, `${name} (${ending.slice(1)})`)));
+  const save =
+    keys.file && job.has.includes("file") && !keys.readOnly
+      ? saveAs("Save", keys.file, (name, replace) => api.saveOf(job.id, { what: "file", name, replace }), keys.onSave)
+      : null;
+  const links = Object.entries(PARTS)
+    .filter(([what]) => job.has.includes(what))
+    .map(([what, [name, ending]]) =>
+      el(
+        "li",
+        null,
+        el("a", { href: api.href(job.id, what), download: `${keys.stem}${ending}` }, `${name} (${ending.slice(1)})`),
+      ),
+    );
   const open = job.has.includes("page")
-    ? el("li", null, el("a", { href: api.href(job.id, "page"), target: "_blank", rel: "noopener" }, "Open the report")) : null;
+    ? el("li", null, el("a", { href: api.href(job.id, "page"), target: "_blank", rel: "noopener" }, "Open the report"))
+    : null;
   return el("div", { className: "export" }, save, details("Export", el("ul", null, open, links)));
 }

@@ -58,8 +58,18 @@ const tab = (page, name) => page.getByRole('tab', { name, exact: true }).click()
 const VIEWS = {
   log: [{ log: 'log.npy' }, (page) => page.panel.locator('canvas').first().waitFor()],
   noise: [{ log: 'log.npy' }, (page) => page.panel.locator('.handle').first().waitFor()],
-  design: [{}, (page) => page.panel.locator('canvas').first().waitFor()],
-  compare: [{}, (page) => page.panel.waitFor()],
+  design: [{ params: 'params.json' }, (page) => page.panel.locator('canvas').first().waitFor()],
+  compare: [
+    { params: 'params.json' },
+    async (page) => {
+      await tab(page, 'Design');
+      await page.panel.locator('canvas').first().waitFor();
+      await page.getByLabel('Name of the pin').fill('one');
+      await page.panel.getByRole('button', { name: 'Pin for Compare' }).click();
+      await tab(page, 'Compare');
+      await page.panel.locator('canvas').first().waitFor();
+    },
+  ],
   replay: [
     { 'replay.filter': 'wrong.json', 'replay.log': 'log.npy' },
     async (page) => {
@@ -286,6 +296,40 @@ test('a changed flight is saved, and the command line judges it alike', { skip }
   const said = JSON.parse(stdout);
   const kept = said.criteria.filter((it) => it.pass).length;
   assert.match(drafted, new RegExp(`${kept} of ${said.criteria.length} criteria`));
+  await close(page);
+});
+
+test('designs are pinned and compared; a deleted one comes back, and a reload keeps them', { skip }, async () => {
+  const page = await open({ panel: 'design', params: 'params.json' });
+  await VIEWS.design[1](page);
+  const pin = async (name) => {
+    await page.getByLabel('Name of the pin').fill(name);
+    await page.panel.getByRole('button', { name: 'Pin for Compare' }).click();
+  };
+  await pin('as it is');
+  const slider = page.panel.locator('.slider input[type=range]').first();
+  await slider.focus();
+  for (let i = 0; i < 5; i++) await page.keyboard.press('PageUp');
+  await page.waitForFunction(() => /[#&]x=/.test(location.hash));
+  await page.waitForTimeout(1500);
+  await pin('louder');
+  await tab(page, 'Compare');
+  await page.panel.locator('canvas').waitFor();
+  for (const name of ['as it is', 'louder']) await page.panel.getByRole('columnheader', { name }).first().waitFor();
+  await page.panel.getByRole('button', { name: 'Delete louder' }).click();
+  await page.panel.getByRole('columnheader', { name: 'louder' }).first().waitFor({ state: 'detached' });
+  await page.panel.getByRole('button', { name: /^Undo/ }).click();
+  await page.panel.getByRole('columnheader', { name: 'louder' }).first().waitFor();
+  await page.reload();
+  await page.panel.locator('canvas').waitFor();
+  for (const name of ['as it is', 'louder']) await page.panel.getByRole('columnheader', { name }).first().waitFor();
+  const cells = await page.panel
+    .getByRole('row', { name: /σ at the end/ })
+    .first()
+    .getByRole('cell')
+    .allTextContents();
+  assert.equal(cells.length, 2);
+  assert.notEqual(cells[0], cells[1]);
   await close(page);
 });
 

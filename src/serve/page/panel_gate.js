@@ -18,6 +18,7 @@ import {
   table,
   textField,
 } from "./ui.js";
+import { shownUnit } from "./panel_design.js";
 import { filesOf, heading, testTable } from "./panel_replay.js";
 import { figure } from "./plot.js";
 
@@ -207,19 +208,22 @@ export const panel = {
           ],
         );
         for (const error of axis.errors) {
+          const [unit, factor] = shownUnit(error.unit);
+          /** @param {number[]} values */
+          const inUnit = (values) => values.slice(from).map((v) => v * factor);
           add(
             section,
             figure({
               title: `${axis.name}: error of ${error.name}`,
               x: "time (s)",
-              y: `rms (${error.unit})`,
+              y: `rms (${unit})`,
               xLog: true,
               yLog: true,
               sync: "gate",
             }),
             [
-              { name: "rms of the runs", x, y: error.rms.slice(from), colour: 1, width: 2 },
-              { name: "what the filter says", x, y: error.predicted_sigma.slice(from), colour: 2, dash: 1 },
+              { name: "rms of the runs", x, y: inUnit(error.rms), colour: 1, width: 2 },
+              { name: "what the filter says", x, y: inUnit(error.predicted_sigma), colour: 2, dash: 1 },
             ],
           );
         }

@@ -16,6 +16,7 @@ import {
   table,
   textField,
 } from "./ui.js";
+import { shownUnit } from "./panel_design.js";
 import { reading as logReading } from "./panel_log.js";
 import { figure } from "./plot.js";
 
@@ -274,8 +275,12 @@ export const panel = {
         axis && range ? [`${number(range[0])} to ${number(range[1])} s `, button("Whole log", () => zoom(null))] : null,
       );
       if (!axis) return;
-      const { trace, unit } = axis;
+      const { trace } = axis;
       const x = trace.time_s;
+      const [unit, factor] = shownUnit(axis.unit);
+      /** @param {number[]} values */
+      const inUnit = (values) => values.map((v) => v * factor);
+      const [estimate, sigma, measured] = [trace.estimate, trace.sigma, trace.measured].map(inUnit);
       /** @param {string} title @param {string} y @param {import("./plot.js").Line[]} lines */
       const inTime = (title, y, lines) => {
         const made = figure({
@@ -300,7 +305,7 @@ export const panel = {
         {
           name: many ? `log, mean of ${axis.samples_per_point} samples` : "log",
           x,
-          y: trace.measured,
+          y: measured,
           faint: true,
           colour: 3,
           dash: 2,
@@ -308,13 +313,13 @@ export const panel = {
         {
           name: "± 3 sigma",
           x,
-          y: trace.estimate,
-          low: trace.estimate.map((v, i) => v - BOUND * trace.sigma[i]),
-          high: trace.estimate.map((v, i) => v + BOUND * trace.sigma[i]),
+          y: estimate,
+          low: estimate.map((v, i) => v - BOUND * sigma[i]),
+          high: estimate.map((v, i) => v + BOUND * sigma[i]),
           kind: "band",
           colour: 1,
         },
-        { name: "estimate", x, y: trace.estimate, colour: 1, width: 2 },
+        { name: "estimate", x, y: estimate, colour: 1, width: 2 },
       ]);
       const bounds = [BOUND, -BOUND].map((v) => ({
         name: `${v > 0 ? "+" : "−"}${BOUND}`,

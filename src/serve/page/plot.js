@@ -82,7 +82,7 @@ export function figure(keys) {
   const rows = details("Table");
   const root = el(
     "figure",
-    null,
+    { className: "empty" },
     el("figcaption", null, keys.title),
     legend,
     el("div", { className: "frame" }, place),
@@ -384,8 +384,9 @@ export function figure(keys) {
   }
 
   // filled when it is opened: a table of ten thousand rows that nobody reads costs time
-  rows.addEventListener("toggle", () => {
-    if (!rows.open) return;
+  rows.addEventListener("toggle", () => rows.open && fillRows());
+  let later = 0;
+  function fillRows() {
     const most = 2000;
     const parts = lines.map((line) => {
       const cells = Array.from({ length: Math.min(line.x.length, most) }, (_, i) => [
@@ -418,7 +419,7 @@ export function figure(keys) {
       csv,
       el("div", { className: "columns" }, parts),
     );
-  });
+  }
 
   const resized = new ResizeObserver(() => {
     if (!u || !place.clientWidth || u.width === width()) return;
@@ -447,6 +448,7 @@ export function figure(keys) {
       const now = JSON.stringify(
         lines.map(({ name, kind, colour, dash, width, faint }) => [name, kind, colour, dash, width, faint]),
       );
+      root.classList.toggle("empty", lines.length === 0);
       if (lines.length === 0) {
         u?.destroy();
         u = null;
@@ -462,7 +464,8 @@ export function figure(keys) {
           if (place.isConnected) build();
         });
       shape = now;
-      rows.open = false;
+      clearTimeout(later);
+      if (rows.open) later = window.setTimeout(fillRows, 300);
     },
     /** Handles on lines; those of the same names keep focus and pointer. @param {Handle[]} next */
     setHandles(next) {

@@ -1,6 +1,6 @@
 // Compare: up to six designs in the same axes.
 
-import { kept } from "./panel_noise.js";
+import { FOUND, kept } from "./panel_noise.js";
 import { sigmaLine } from "./panel_design.js";
 import { figure } from "./plot.js";
 import { reading } from "./panel_log.js";
@@ -12,7 +12,7 @@ import { announce, button, el, fill, number, selectField, table } from "./ui.js"
 const MOST = 6;
 const STORE = "pinned";
 
-/** @typedef {{name: string, plant: string, axes: import("./panel_design.js").AxisResult[], verdict: string, params: any, request: any,
+/** @typedef {{name: string, plant: string, axes: import("./panel_design.js").AxisResult[], verdict: string, params: any, unsaved: any,
  *   view: Record<string, string>, colour?: number, against?: {log: string, verdict: string, meaning: string}}} Pin */
 
 /** @returns {Pin[]} */
@@ -132,7 +132,7 @@ export const panel = {
               "li",
               { className: "row" },
               name,
-              button("Open", () => ctx.open("design", it.view), { "aria-label": `Open ${it.name} in Design` }),
+              button("Open", () => open(it), { "aria-label": `Open ${it.name} in Design` }),
               button(
                 "Delete",
                 () => {
@@ -151,6 +151,12 @@ export const panel = {
       );
       undo.hidden = !gone;
       undo.textContent = gone ? `Undo: bring ${gone.pin.name} back` : "Undo";
+    }
+
+    /** @param {Pin} it */
+    function open(it) {
+      if (it.unsaved) kept(FOUND, it.unsaved);
+      ctx.open("design", it.view);
     }
 
     function show() {

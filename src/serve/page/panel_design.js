@@ -266,7 +266,7 @@ export const panel = {
     async function load() {
       const name = source.input.value;
       const found = kept(FOUND);
-      const key = `${name}|${ctx.project.files.find((it) => it.name === name)?.modified ?? JSON.stringify(found)?.length}`;
+      const key = `${name}|${ctx.project.files.find((it) => it.name === name)?.modified ?? JSON.stringify(found)}`;
       if (key === loaded && params) return;
       loaded = key;
       params = name ? await api.file(name) : found;
@@ -359,6 +359,8 @@ export const panel = {
         .map(([id, f]) => `${id}=${state.digits4(f)}`)
         .join(";");
 
+    const altered = () => [...factors].some(([id, f]) => f !== 1 && !/^aid\d+$/.test(id));
+
     /** @param {string} id @param {number} factor */
     function move(id, factor) {
       factors.set(id, factor);
@@ -442,7 +444,8 @@ export const panel = {
     function request() {
       const is = plant.input.value;
       return {
-        params: "draft:params.json",
+        // a file that is as it is needs no draft, and its command can be copied
+        params: source.input.value && !altered() ? source.input.value : "draft:params.json",
         plant: {
           ...(is ? { plant: is } : {}),
           ...(aids.length ? { aid: aids.map((aid, i) => aidText(aid, factors.get(`aid${i}`))) } : {}),
@@ -614,7 +617,8 @@ export const panel = {
         axes: shown,
         verdict: document.verification?.verdict ?? "not verified",
         params: draft(),
-        request: request(),
+        // of a file that is not there, what the sliders began with
+        unsaved: source.input.value ? null : params,
         view: Object.fromEntries(
           ["params", "plant", "aids", "motion", "accelerometer", "x"].map((key) => [key, state.get(key)]),
         ),

@@ -425,8 +425,9 @@ export const panel = {
     /** Tables of a file with several. @param {string} log */
     async function topics(log) {
       try {
-        const job = await api.run("info", { log });
-        const info = await api.document_(job.id);
+        const done = await api.run("info", { log });
+        job.update(done);
+        const info = await api.document_(done.id);
         const tables = info.topics.filter((/** @type {any} */ it) => it.name && it.rows > 0);
         topic.hidden = tables.length < 2;
         topic.set(

@@ -96,6 +96,8 @@ export const panel = {
     /** @type {import("./api.js").Job | null} */
     let finished = null;
     let asked = "";
+    /** Log and range. */
+    let about = "";
     /** Under way. */
     let running = 0;
     let pause = 0;
@@ -205,7 +207,7 @@ export const panel = {
       const other = state.get("view") === "spectrum";
       plot.hidden = other;
       spectrum.hidden = !other;
-      if (draft) ask();
+      if (result) ask();
     };
 
     /** @param {Record<string, any>} values */
@@ -238,6 +240,16 @@ export const panel = {
       );
       if (!log) return;
       const now = request();
+      const subject = JSON.stringify([log, now.reading]);
+      if (result && subject !== about) {
+        // of another log
+        result = finished = null;
+        [plot, spectrum].forEach((one) => one.set([]));
+        plot.setHandles([]);
+        [sliders, candidates, numbers, cost, out].forEach((part) => fill(part));
+        design.hidden = true;
+      }
+      about = subject;
       const key = JSON.stringify([now, ctx.project.files.find(({ name }) => name === log)?.modified]);
       if (key === asked) return;
       asked = key;

@@ -1,6 +1,6 @@
 // Figures: uPlot draws axes and lines, this file what it has not: intervals, bands, marks, handles, and a table.
 
-import { button, details, el, fill, number, table } from "./ui.js";
+import { button, details, download, el, fill, number, table } from "./ui.js";
 
 /** @type {any} */
 const UPlot = /** @type {any} */ (window).uPlot;
@@ -398,7 +398,7 @@ export function figure(keys) {
       const head = [keys.x, ...(line.kind === "band" ? [] : [keys.y]), ...(line.low && line.high ? ends : [])];
       return table({ caption: line.name, head, rows: cells });
     });
-    const csv = button("Download CSV", async () => {
+    const csv = button("Download CSV", () => {
       const text = lines
         .map((line) =>
           [
@@ -409,10 +409,7 @@ export function figure(keys) {
           ].join("\n"),
         )
         .join("\n");
-      (await import("./ui.js")).download(
-        `${keys.title.replace(/[^A-Za-z0-9]+/g, "-")}.csv`,
-        new Blob([text + "\n"], { type: "text/csv" }),
-      );
+      download(`${keys.title.replace(/[^A-Za-z0-9]+/g, "-")}.csv`, new Blob([text + "\n"], { type: "text/csv" }));
     });
     rows.replaceChildren(
       /** @type {Element} */ (rows.firstElementChild),

@@ -8,7 +8,8 @@
  *   verdict: string | null, has: string[]}} Job
  * @typedef {{axes: string[], unit: string, rate: number, samples: number, seconds: number, start: number,
  *   check: any}} Head
- * @typedef {{drafts?: Record<string, any>, replace?: boolean, onJob?: (job: Job) => void, signal?: AbortSignal}} Options
+ * @typedef {{drafts?: Record<string, any>, replace?: boolean, onJob?: (job: Job) => void,
+ * signal?: AbortSignal}} Options
  */
 
 /** What the server refuses, in its own line. */
@@ -149,7 +150,8 @@ export const upload = (name, content) =>
 
 /** @param {{name: string, document?: any, text?: string, replace?: boolean}} what @returns {Promise<{name: string}>} */
 export const save = async (what) => (await post("api/save", what)).json();
-/** @param {number} id @param {{what: string, name: string, replace?: boolean}} what @returns {Promise<{name: string}>} */
+/** @param {number} id @param {{what: string, name: string, replace?: boolean}} what
+ * @returns {Promise<{name: string}>} */
 export const saveOf = async (id, what) => (await post(`${href(id, "save")}`, what)).json();
 
 /** One request at a time and always the newest: while one is under way, only the last of those asked for is kept.

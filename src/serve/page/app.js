@@ -13,7 +13,8 @@ import { panel as exporting } from "./panel_export.js";
 import { panel as loop } from "./panel_loop.js";
 
 /**
- * @typedef {{api: typeof api, state: typeof state, project: api.Project, open: (panel: string, values?: Record<string, any>) => void,
+ * @typedef {{api: typeof api, state: typeof state, project: api.Project, open: (panel: string,
+ * values?: Record<string, any>) => void,
  *   refresh: () => Promise<void>, tour: () => void}} Context
  * @typedef {{id: string, title: string, show: (root: HTMLElement, ctx: Context) => void | (() => void)}} Panel
  */
@@ -99,15 +100,18 @@ function tabs() {
 const STEPS = [
   [
     "log",
-    "Log: pick a log of the sensor at rest. What the check finds is marked in the trace. Drag over the calm part, or take the one that is offered.",
+    "Log: pick a log of the sensor at rest. What the check finds is marked in the trace. Drag over the " +
+      "calm part, or take the one that is offered.",
   ],
   [
     "noise",
-    "Noise: Allan deviations with 95 % bars, the fitted model and each of its terms. Move a term by its handle or its slider; let go with others unlocked and they are found anew.",
+    "Noise: Allan deviations with 95 % bars, the fitted model and each of its terms. Move a term by its " +
+      "handle or its slider; let go with others unlocked and they are found anew.",
   ],
   [
     "design",
-    "Design: choose plant and aids. The sliders stand on the identified numbers, the interval is drawn above each. σ(t) and the error budget follow; Verify simulates runs.",
+    "Design: choose plant and aids. The sliders stand on the identified numbers, the interval is drawn " +
+      "above each. σ(t) and the error budget follow; Verify simulates runs.",
   ],
   ["compare", "Compare: pin up to six designs and see them in the same axes."],
   ["replay", "Replay: a recorded log through the filter, with tests of its innovations."],
@@ -117,7 +121,8 @@ const STEPS = [
   ],
   [
     "export",
-    "Export: the numbers for other programs, or the filter as C or Rust. Each panel shows the command that does the same.",
+    "Export: the numbers for other programs, or the filter as C or Rust. Each panel shows the command " +
+      "that does the same.",
   ],
 ];
 

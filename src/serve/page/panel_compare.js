@@ -12,7 +12,8 @@ import { announce, button, el, fill, number, selectField, table } from "./ui.js"
 const MOST = 6;
 const STORE = "pinned";
 
-/** @typedef {{name: string, plant: string, axes: import("./panel_design.js").AxisResult[], verdict: string, params: any, unsaved: any,
+/** @typedef {{name: string, plant: string, axes: import("./panel_design.js").AxisResult[], verdict: string,
+ * params: any, unsaved: any,
  *   view: Record<string, string>, colour?: number, against?: {log: string, verdict: string, meaning: string}}} Pin */
 
 /** @returns {Pin[]} */

@@ -39,8 +39,10 @@ const SHOWN = { rad: ["deg", 180 / Math.PI], "rad/s": ["deg/s", 180 / Math.PI] }
 export const shownUnit = (unit) => SHOWN[unit] ?? [unit, 1];
 
 /**
- * @typedef {{name: string, unit: string, sigma: number[], budget: {name: string, share: number}[], gain: number[]}} StateResult
- * @typedef {{name: string, time: number[], states: StateResult[], settling: number | null, poles: number[][], notes: string[]}} AxisResult
+ * @typedef {{name: string, unit: string, sigma: number[], budget: {name: string, share: number}[],
+ * gain: number[]}} StateResult
+ * @typedef {{name: string, time: number[], states: StateResult[], settling: number | null, poles: number[][],
+ * notes: string[]}} AxisResult
  */
 
 /** What figures need of a document of `tune`. @param {any} document @returns {AxisResult[]} */
@@ -109,7 +111,8 @@ export function results(document) {
   });
 }
 
-/** σ(t) of one state. @param {AxisResult} axis @param {string} state @param {Partial<import("./plot.js").Line>} look @returns {import("./plot.js").Line[]} */
+/** σ(t) of one state. @param {AxisResult} axis @param {string} state
+ * @param {Partial<import("./plot.js").Line>} look @returns {import("./plot.js").Line[]} */
 export function sigmaLine(axis, state, look) {
   const found = axis.states.find(({ name }) => name === state);
   if (!found) return [];
@@ -596,7 +599,9 @@ export const panel = {
           const [unit, factor] = shownUnit(output.unit);
           const { factors } = output.worth[0];
           return table({
-            caption: `σ of ${output.name} (${unit}) if a parameter were so many times as large; now ${number(output.sigma * factor)}`,
+            caption:
+              `σ of ${output.name} (${unit}) if a parameter were so many times as large; ` +
+              `now ${number(output.sigma * factor)}`,
             head: ["Parameter", ...factors.map((/** @type {number} */ f) => `×${number(f, 3)}`)],
             rows: output.worth.map((/** @type {any} */ it) => [
               it.parameter,

@@ -228,7 +228,8 @@ export const panel = {
           : el(
               "p",
               null,
-              "Add a log of your sensor at rest, or begin with a simulated one: a MEMS gyro of three axes, 2 h at 100 Hz.",
+              "Add a log of your sensor at rest, or begin with a simulated one: a MEMS gyro of three " +
+                "axes, 2 h at 100 Hz.",
             ),
         state.get("log") && found.length ? null : start,
       );
@@ -379,7 +380,9 @@ export const panel = {
         return;
       }
       const { check, axes, rate: hz, seconds, unit: shown } = head;
-      facts.textContent = `${check.samples} samples, ${number(hz)} Hz, ${duration(seconds)}, ${axes.length} ${axes.length === 1 ? "axis" : "axes"} in ${shown}`;
+      facts.textContent =
+        `${check.samples} samples, ${number(hz)} Hz, ${duration(seconds)}, ` +
+        `${axes.length} ${axes.length === 1 ? "axis" : "axes"} in ${shown}`;
       announce(facts.textContent);
       chosen.hidden = false;
       traces = axes
@@ -435,7 +438,8 @@ export const panel = {
             ["", "found by name"],
             ...tables.map((/** @type {any} */ it) => [
               it.name,
-              `${it.name}${it.kind ? `, ${it.kind}` : ""}: ${it.rows} rows${it.rate_hz ? `, ${number(it.rate_hz)} Hz` : ""}`,
+              `${it.name}${it.kind ? `, ${it.kind}` : ""}: ${it.rows} rows` +
+                (it.rate_hz ? `, ${number(it.rate_hz)} Hz` : ""),
             ]),
           ],
           state.get("topic"),

@@ -478,7 +478,8 @@ export const panel = {
           ? el(
               "p",
               null,
-              `Temperature: ${measured(temperature.coefficient)}, over ${measured(temperature.span)} about ${measured(temperature.reference)}. `,
+              `Temperature: ${measured(temperature.coefficient)}, over ${measured(temperature.span)} ` +
+                `about ${measured(temperature.reference)}. `,
             )
           : null,
         (own.not_identified ?? []).length
@@ -489,7 +490,8 @@ export const panel = {
                 el(
                   "li",
                   null,
-                  `${TERMS[it.term] ?? it.term}: ${it.reason}${it.needed_log ? `; a log of ${measured(it.needed_log, 3)} would tell` : ""}`,
+                  `${TERMS[it.term] ?? it.term}: ${it.reason}` +
+                    (it.needed_log ? `; a log of ${measured(it.needed_log, 3)} would tell` : ""),
                 ),
               ),
             )
@@ -516,7 +518,8 @@ export const panel = {
       );
     }
 
-    /** Where handles take their lines: the place on each term is kept while it is dragged. @type {Map<string, number>} */
+    /** Where handles take their lines: the place on each term is kept while it is dragged.
+     * @type {Map<string, number>} */
     const places = new Map();
 
     const curve = api.latest(

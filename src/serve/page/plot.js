@@ -53,7 +53,8 @@ function sample(line) {
   return svg;
 }
 
-/** Labels of a logarithmic axis: whole decades, and 2 and 5 where there are few. @param {any} u @param {number[]} splits */
+/** Labels of a logarithmic axis: whole decades, and 2 and 5 where there are few. @param {any} u
+ * @param {number[]} splits */
 function decades(u, splits) {
   const lasting = splits.filter((v) => /^1(e|$)/.test(v.toExponential().replace("1.0000", "1"))).length;
   return splits.map((v) => {
@@ -157,7 +158,8 @@ export function figure(keys) {
     c.stroke();
   }
 
-  /** A range with air above and below; of a logarithm, of the logarithm. @param {number | null} min @param {number | null} max @param {boolean} log */
+  /** A range with air above and below; of a logarithm, of the logarithm. @param {number | null} min
+   * @param {number | null} max @param {boolean} log */
   function span(min, max, log) {
     if (min === null || max === null || !Number.isFinite(min) || !Number.isFinite(max)) return log ? [0.1, 10] : [0, 1];
     if (log) {
@@ -430,7 +432,8 @@ export function figure(keys) {
 
   return Object.assign(root, {
     /** What is drawn. Lines that look as before keep the plot and are drawn at once.
-     * @param {Line[]} next @param {{marks?: Mark[], xRange?: [number, number] | null, yRange?: [number, number] | null}} [more] */
+     * @param {Line[]} next
+     * @param {{marks?: Mark[], xRange?: [number, number] | null, yRange?: [number, number] | null}} [more] */
     set(next, more = {}) {
       lines = next.filter((line) => line.x.length);
       if (more.marks) {

@@ -138,7 +138,8 @@ export const details = (summary, ...children) => el("details", null, el("summary
 const STEPS = 1000;
 
 /** A parameter: number, slider on a logarithmic scale with its interval drawn on it, and, where wanted, a lock.
- * @param {{label: string, unit: string, value: number, min: number, max: number, interval?: [number | null, number | null],
+ * @param {{label: string, unit: string, value: number, min: number, max: number, interval?: [number | null,
+ * number | null],
  *   locked?: boolean, onInput?: (value: number) => void, onChange?: (value: number) => void,
  *   onLock?: (locked: boolean) => void}} keys */
 export function slider(keys) {
@@ -179,7 +180,8 @@ export function slider(keys) {
     // the thumb's middle goes from half its width to as much before the end
     band.style.left = `calc(8px + ${from} * (100% - 16px))`;
     band.style.width = `calc(2px + ${Math.max(0, to - from)} * (100% - 16px))`;
-    band.title = `95 % interval: ${low === null ? "open" : number(low)} to ${high === null ? "open" : number(high)} ${unit}`;
+    const ends = [low, high].map((v) => (v === null ? "open" : number(v)));
+    band.title = `95 % interval: ${ends.join(" to ")} ${unit}`;
   };
   range.addEventListener("input", () => {
     value = at(Number(range.value) / STEPS);

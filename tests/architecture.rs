@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// The one table of rooms: floor, room, and the rooms of its own floor it may use besides every lower floor.
 /// `docs/architecture.md` shows the same table.
-const HOUSE: [(u8, &str, &[&str]); 27] = [
+const HOUSE: [(u8, &str, &[&str]); 28] = [
     (0, "units", &[]),
     (0, "numerics", &[]),
     (1, "signal", &[]),
@@ -32,7 +32,9 @@ const HOUSE: [(u8, &str, &[&str]); 27] = [
     (6, "report", &[]),
     (7, "view", &[]),
     (8, "ops", &[]),
-    (9, "cli", &[]),
+    // two doors: a command starts the server, which does what commands do
+    (9, "serve", &["cli"]),
+    (9, "cli", &["serve"]),
 ];
 
 /// The wings: folders of rooms that stand on floors of their own.

@@ -34,6 +34,8 @@ mod plants;
 mod progress;
 mod replay;
 mod report;
+#[cfg(feature = "serve")]
+mod serve;
 mod shell;
 mod simulate;
 mod support;

@@ -9,7 +9,9 @@ use super::Cli;
 /// command or a key is not known.
 pub fn words(name: &str, request: &Value) -> Result<Vec<String>, String> {
     let (command, hidden) = if name == "rank" { ("tune", Some(("files", "rank"))) } else { (name, None) };
-    let all = Cli::command();
+    let mut all = Cli::command();
+    // only then its arguments know their places
+    all.build();
     let known = all.find_subcommand(command).ok_or_else(|| format!("no command {name}"))?;
     let mut places: Vec<(usize, String)> = Vec::new();
     let mut options = Vec::new();

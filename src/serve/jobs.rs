@@ -181,8 +181,8 @@ impl Job {
         let work = || {
             let made = make(&asked.command, &request)?;
             // what is said of it is small, and drawn while who asked still waits
-            let (brief, verdict) = (made.shown("brief")?, made.shown("verdict")?);
-            anyhow::Ok((made, brief, verdict))
+            let said = made.shown("brief").and_then(|brief| Ok((brief, made.shown("verdict")?)));
+            said.map(|(brief, verdict)| (made, brief, verdict))
         };
         let done = catch_unwind(AssertUnwindSafe(|| watched(&watch, work)));
         match done {

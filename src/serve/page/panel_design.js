@@ -22,6 +22,8 @@ import {
 
 /** Sliders go from half to eight times what was identified; a span that an interval needs is added. */
 const [LEAST, MOST] = [0.5, 8];
+/** A preview says nothing of them: the verification is what takes time. */
+const FEWEST_RUNS = 2;
 /** Rates of aids that a slider reaches about the one typed. */
 const RATE_REACH = 10;
 const PLANTS = [
@@ -461,7 +463,7 @@ export const panel = {
 
     const preview = api.latest(
       (/** @type {{request: any, draft: any, key: string, plain: boolean}} */ it) =>
-        api.preview("tune", { ...it.request, runs: 0 }, { drafts: { "params.json": it.draft } }),
+        api.preview("tune", { ...it.request, runs: FEWEST_RUNS }, { drafts: { "params.json": it.draft } }),
       (made, it) => {
         problem.hidden = true;
         document = made;
@@ -471,6 +473,8 @@ export const panel = {
         draw();
       },
       (error) => {
+        // another tab asked
+        if (/** @type {import("./api.js").ApiError} */ (error).status === 409) return;
         problem.hidden = false;
         problem.textContent = error.message;
       },
@@ -620,7 +624,7 @@ export const panel = {
         name,
         plant: plant.input.value,
         axes: shown,
-        verdict: document.verification?.verdict ?? "not verified",
+        verdict: verified ? document.verification?.verdict : "not verified",
         params: draft(),
         // of a file that is not there, what the sliders began with
         unsaved: source.input.value ? null : params,

@@ -202,7 +202,8 @@ export function figure(keys) {
     return keys.xLog ? span(min, max, true) : min === max ? [min - 1, max + 1] : [min, max];
   }
 
-  const width = () => Math.max(240, Math.floor(place.clientWidth));
+  // a figure without lines has no width of its own
+  const width = () => Math.max(240, Math.floor(place.clientWidth || (root.parentElement?.clientWidth ?? 0)));
   const height = () => keys.height ?? 320;
 
   function build() {

@@ -217,7 +217,7 @@ export function slider(keys) {
     { className: "slider" },
     el("span", { className: "name", id: name }, label),
     el("span", { className: "amount" }, box, el("span", { className: "unit" }, unit)),
-    el("span", { className: lock ? "track" : "track alone" }, band, range),
+    el("span", { className: "track" }, band, range),
     lock && el("label", { className: "lock" }, lock, "hold"),
     note,
   );

@@ -39,22 +39,21 @@ export function reading(whole = false) {
   return out;
 }
 
-/** The sensor of the worked example: a MEMS gyro with a slow drift. */
+/** A MEMS gyro with a drift so quick that twenty minutes tell it. */
 const EXAMPLE = {
   format: "kfdesign-params/1",
   quantity: "angular-rate",
   sample_rate: { value: 100, unit: "Hz" },
   axes: ["x", "y", "z"].map((name) => ({
     name,
-    bias: { value: -0.597, unit: "deg/s" },
-    turn_on_bias: { std_dev: { value: 0.6, unit: "deg/s" } },
-    white: { density: { value: 0.0562, unit: "deg/s/sqrt(Hz)" } },
-    gauss_markov: [{ std_dev: { value: 0.0280596, unit: "deg/s" }, correlation_time: { value: 193.9312, unit: "s" } }],
+    bias: { value: -0.3, unit: "deg/s" },
+    turn_on_bias: { std_dev: { value: 0.3, unit: "deg/s" } },
+    white: { density: { value: 0.02, unit: "deg/s/sqrt(Hz)" } },
+    gauss_markov: [{ std_dev: { value: 0.03, unit: "deg/s" }, correlation_time: { value: 30, unit: "s" } }],
   })),
-  source: { note: "Simulated example: a MEMS gyro with white noise and a drift of 194 s correlation time." },
+  source: { note: "Simulated example: a MEMS gyro with white noise and a drift of 30 s correlation time." },
 };
-/** Long enough that the drift shows. */
-const EXAMPLE_LENGTH = "2h";
+const EXAMPLE_LENGTH = "20min";
 const EXAMPLE_LOG = "example.csv.gz";
 
 /** @type {import("./app.js").Panel} */
@@ -102,6 +101,7 @@ export const panel = {
       hint: "Names or numbers, with commas.",
     });
     const time = textField("Time column", {
+      hint: "With its unit where the header has none: time:s.",
       placeholder: "found by name",
       onchange: (value) => again({ time: value }),
     });
@@ -229,7 +229,7 @@ export const panel = {
               "p",
               null,
               "Add a log of your sensor at rest, or begin with a simulated one: a MEMS gyro of three " +
-                "axes, 2 h at 100 Hz.",
+                "axes, 20 min at 100 Hz.",
             ),
         state.get("log") && found.length ? null : start,
       );

@@ -44,6 +44,8 @@ const METHODS = [
   ["graphical", "graphical"],
 ];
 const DEVIATION_POINTS = 160;
+/** A term that has so much of the deviation is as good as alone. */
+const NEARLY = 0.98;
 /** Between the last key and a refit, ms: longer than the repetition of a key that is held down. */
 const KEYS_PAUSE = 350;
 
@@ -568,13 +570,21 @@ export const panel = {
       if (!points) return;
       const [least, most] = [points.tau_s[0], points.tau_s[points.tau_s.length - 1] * 3];
       curve({
-        params: draft,
+        // a document whose number lies outside its own interval is none
+        params: JSON.parse(JSON.stringify(draft, (key, value) => (key === "interval" ? undefined : value))),
         axis: name(),
         times: Array.from(
           { length: DEVIATION_POINTS },
           (_, i) => least * (most / least) ** (i / (DEVIATION_POINTS - 1)),
         ),
       });
+    }
+
+    /** The middle of where values are so near to the largest. @param {number[]} values @param {number} near */
+    function top(values, near) {
+      const least = near * Math.max(...values);
+      const [first, ...more] = values.flatMap((v, i) => (v >= least ? [i] : []));
+      return Math.floor((first + (more.at(-1) ?? first)) / 2);
     }
 
     /** A handle stands where its term says most; that of a hump on its top.
@@ -594,14 +604,11 @@ export const panel = {
         const time = own.find((p) => p.term === term.name && p.at === at && p.field === "correlation_time");
         if (!amount) return [];
         const hump = term.name === "gauss_markov";
-        /** @param {(i: number) => number} of */
-        const top = (of) => {
-          let best = 4;
-          for (let i = 4; i < inside - 8; i++) if (of(i) > of(best)) best = i;
-          return best;
-        };
         const stays = dragged === amount.id ? places.get(amount.id) : undefined;
-        const i = hump ? top((i) => term.deviation[i]) : (stays ?? top((i) => term.deviation[i] / it.deviation[i]));
+        const line = term.deviation.slice(0, inside);
+        const shares = line.map((v, n) => v / it.deviation[n]);
+        /** @type {number} */
+        const i = hump ? top(line, 1) : (stays ?? top(shares, NEARLY));
         places.set(amount.id, i);
         const here = { x: it.times[i], y: term.deviation[i] };
         return [

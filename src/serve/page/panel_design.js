@@ -28,9 +28,9 @@ const FEWEST_RUNS = 2;
 const RATE_REACH = 10;
 const PLANTS = [
   ["static", "static: the sensor alone"],
-  ["angle", "angle: one axis, integrated"],
-  ["rate", "rate: the rate itself is wanted"],
-  ["vertical", "vertical: height and speed"],
+  ["angle", "angle: the rate, integrated"],
+  ["rate", "rate: the true rate, which moves"],
+  ["vertical", "vertical: roll or pitch"],
   ["attitude", "attitude: three axes"],
   ["airplane", "airplane"],
 ];
@@ -168,7 +168,12 @@ export const panel = {
       onchange: (value) => change({ motion: value }),
       hint: "σ over correlation time, or a density",
     });
-    const accelerometer = selectField("Accelerometer", [], { onchange: (value) => change({ accelerometer: value }) });
+    const sensorNames = el("datalist", { id: "sensors" });
+    const accelerometer = textField("Accelerometer", {
+      hint: "Noise parameters: FILE, or FILE:AXIS",
+      onchange: (value) => change({ accelerometer: value }),
+    });
+    accelerometer.input.setAttribute("list", sensorNames.id);
     const flight = selectField("Flight", [], { onchange: (value) => change({ flight: value }) });
     const aidRows = el("div");
     const axis = selectField("Axis", [], {
@@ -211,7 +216,7 @@ export const panel = {
       el(
         "div",
         { className: "controls" },
-        el("section", null, source, plant, motion, accelerometer, flight),
+        el("section", null, source, plant, motion, accelerometer, sensorNames, flight),
         el("section", null, el("h2", null, "Aids"), aidRows),
         el("section", null, el("h2", null, "Parameters"), axis, knobs, el("div", { className: "row" }, reset)),
         el("section", null, el("div", { className: "row" }, verify), more, job, out),
@@ -240,10 +245,11 @@ export const panel = {
         options.length ? options : [["", "no params.json yet"]],
         state.get("params") || (found ? "" : (sensors[0] ?? "")),
       );
-      accelerometer.set(
-        [["", "choose"], ...sensors.map((name) => /** @type {[string, string]} */ ([name, name]))],
-        state.get("accelerometer"),
+      fill(
+        sensorNames,
+        sensors.map((name) => el("option", { value: name })),
       );
+      accelerometer.input.value = state.get("accelerometer");
       flight.set(
         [
           ["", "choose"],
@@ -436,7 +442,7 @@ export const panel = {
           button("Add an aid", () =>
             add(
               plant.input.value === "vertical"
-                ? { name: "altitude", sigma: "1 m", rate: "10 Hz", drift: "" }
+                ? { name: "tilt", sigma: "1 deg", rate: "10 Hz", drift: "" }
                 : { name: "heading", sigma: "2 deg", rate: "1 Hz", drift: "" },
             ),
           ),
@@ -575,7 +581,7 @@ export const panel = {
         draw();
         fill(
           brief,
-          el("h2", null, `Verified: ${done.verdict ?? document.verification?.verdict ?? ""}`),
+          el("h2", null, done.verdict ? `Verified: ${done.verdict}` : "The design"),
           el("pre", { tabIndex: 0 }, done.brief ?? ""),
         );
         fill(
@@ -609,7 +615,7 @@ export const panel = {
             head: ["Parameter", ...factors.map((/** @type {number} */ f) => `×${number(f, 3)}`)],
             rows: output.worth.map((/** @type {any} */ it) => [
               it.parameter,
-              ...it.sigma.map((/** @type {number} */ v) => number(v * factor, 3)),
+              ...it.sigma.map((/** @type {number | null} */ v) => number(v && v * factor, 3)),
             ]),
           });
         }),

@@ -20,6 +20,8 @@ const UPlot = /** @type {any} */ (window).uPlot;
  * `bare`: the axis below has no words, for one more figure stands under it
  */
 
+/** A logarithmic axis has at least 1, 2 and 5 of some decade. */
+const ENOUGH = 5;
 /** Beside colours, so that a line is known without them. */
 export const DASHES = [[], [8, 4], [2, 3], [10, 3, 2, 3], [14, 4], [5, 2, 1, 2, 1, 2]];
 
@@ -56,11 +58,10 @@ function sample(line) {
 /** Labels of a logarithmic axis: whole decades, and 2 and 5 where there are few. @param {any} u
  * @param {number[]} splits */
 function decades(u, splits) {
-  const lasting = splits.filter((v) => /^1(e|$)/.test(v.toExponential().replace("1.0000", "1"))).length;
-  return splits.map((v) => {
-    const first = Math.round(v / 10 ** Math.floor(Math.log10(v) + 1e-9));
-    return first === 1 || (lasting < 2 && (first === 2 || first === 5)) ? short(v) : null;
-  });
+  // the ends of an axis are splits too, and seldom round
+  const first = splits.map((v) => Number((v / 10 ** Math.floor(Math.log10(v) + 1e-9)).toPrecision(6)));
+  const few = first.filter((digit) => digit === 1).length < 2;
+  return splits.map((v, i) => (first[i] === 1 || (few && (first[i] === 2 || first[i] === 5)) ? short(v) : null));
 }
 /** @param {number} v */
 const short = (v) => number(v, 6);
@@ -101,6 +102,7 @@ export function figure(keys) {
   /** @type {HTMLElement[]} */
   let readings = [];
   let shape = "";
+  let yLog = false;
 
   /** @param {any} u @param {number} v @param {"x" | "y"} scale */
   const pos = (u, v, scale) => u.valToPos(v, scale, true);
@@ -179,13 +181,27 @@ export function figure(keys) {
       for (let i = 0; i < line.x.length; i++) {
         if (line.x[i] < from || line.x[i] > to) continue;
         for (const v of [line.y[i], line.low?.[i], line.high?.[i]]) {
-          if (v === null || v === undefined || Number.isNaN(v) || (keys.yLog && v <= 0)) continue;
+          if (v === null || v === undefined || Number.isNaN(v) || (yLog && v <= 0)) continue;
           min = Math.min(min, v);
           max = Math.max(max, v);
         }
       }
     }
-    return min > max ? span(null, null, !!keys.yLog) : span(min, max, !!keys.yLog);
+    return min > max ? span(null, null, yLog) : span(min, max, yLog);
+  }
+
+  /** Whether heights differ enough for a logarithm: within less, no round number stands at its axis. */
+  function wide() {
+    let [least, most] = [Infinity, 0];
+    for (const line of lines) {
+      for (let i = 0; i < line.x.length && !line.faint; i++) {
+        const v = line.y[i] ?? 0;
+        if (v <= 0) continue;
+        least = Math.min(least, v);
+        most = Math.max(most, v);
+      }
+    }
+    return most >= ENOUGH * least;
   }
 
   function xRange() {
@@ -232,9 +248,9 @@ export function figure(keys) {
         legend: { show: false },
         scales: {
           x: { time: false, distr: keys.xLog ? 3 : 1, range: () => xRange() },
-          y: { distr: keys.yLog ? 3 : 1, range: () => yRange() },
+          y: { distr: yLog ? 3 : 1, range: () => yRange() },
         },
-        axes: [axis(keys.bare ? undefined : keys.x, !!keys.xLog, false), axis(keys.y, !!keys.yLog, true)],
+        axes: [axis(keys.bare ? undefined : keys.x, !!keys.xLog, false), axis(keys.y, yLog, true)],
         cursor: {
           drag: { x: !!keys.onRange, y: false, setScale: false },
           sync: keys.sync ? { key: keys.sync } : undefined,
@@ -446,9 +462,9 @@ export function figure(keys) {
       }
       if ("xRange" in more) keys.xRange = more.xRange;
       if ("yRange" in more) keys.yRange = more.yRange;
-      const now = JSON.stringify(
-        lines.map(({ name, kind, colour, dash, width, faint }) => [name, kind, colour, dash, width, faint]),
-      );
+      yLog = !!keys.yLog && wide();
+      const looks = lines.map(({ name, kind, colour, dash, width, faint }) => [name, kind, colour, dash, width, faint]);
+      const now = JSON.stringify([yLog, looks]);
       root.classList.toggle("empty", lines.length === 0);
       if (lines.length === 0) {
         u?.destroy();

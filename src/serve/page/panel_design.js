@@ -187,6 +187,7 @@ export const panel = {
     const reset = button("Back to the identified numbers", () => change({ x: null }));
     const job = jobView();
     const brief = el("section");
+    const wait = el("p", { className: "hint", hidden: true }, "Designing …");
     const problem = el("p", { className: "error", role: "alert", hidden: true });
     const which = selectField("State", [], {
       onchange: (value) => {
@@ -222,7 +223,7 @@ export const panel = {
         el("section", null, el("div", { className: "row" }, verify), more, job, out),
         el("section", null, el("div", { className: "row" }, pinName, pinned)),
       ),
-      el("div", { className: "figures" }, problem, brief, which, plot, shares, steady, insight, notes),
+      el("div", { className: "figures" }, problem, wait, brief, which, plot, shares, steady, insight, notes),
     );
 
     /** @param {Record<string, any>} values */
@@ -471,6 +472,7 @@ export const panel = {
       (/** @type {{request: any, draft: any, key: string, plain: boolean}} */ it) =>
         api.preview("tune", { ...it.request, runs: FEWEST_RUNS }, { drafts: { "params.json": it.draft } }),
       (made, it) => {
+        wait.hidden = true;
         problem.hidden = true;
         document = made;
         shown = results(made);
@@ -479,6 +481,7 @@ export const panel = {
         draw();
       },
       (error) => {
+        wait.hidden = true;
         // another tab asked
         if (/** @type {import("./api.js").ApiError} */ (error).status === 409) return;
         problem.hidden = false;
@@ -491,6 +494,7 @@ export const panel = {
       const now = request();
       const key = JSON.stringify([loaded, now.plant.plant, aids, state.get("motion"), state.get("accelerometer")]);
       const plain = words() === "";
+      wait.hidden = shown.length > 0;
       preview({ request: now, draft: draft(), key, plain });
       if (verified) {
         // what was verified is another design

@@ -6,15 +6,18 @@ import { figure } from "./plot.js";
 import { reading } from "./panel_log.js";
 import * as api from "./api.js";
 import * as state from "./state.js";
-import { announce, button, el, fill, number, selectField, table } from "./ui.js";
+import { announce, button, el, fill, jobView, number, selectField, table } from "./ui.js";
 
 /** As many as there are colours and dashes. */
 const MOST = 6;
 const STORE = "pinned";
+/** As the command line has them: the last third is foretold; states of flicker cover so many seconds. */
+const HELD_OUT = 1 / 3;
+const SLOWEST = 1e4;
 
 /** @typedef {{name: string, plant: string, axes: import("./panel_design.js").AxisResult[], verdict: string,
  * params: any, unsaved: any,
- *   view: Record<string, string>, colour?: number, against?: {log: string, verdict: string, meaning: string}}} Pin */
+ *   view: Record<string, string>, colour?: number, against?: {log: string, verdict: string, likelihood: number}}} Pin */
 
 /** @returns {Pin[]} */
 const pins = () => kept(STORE) ?? [];
@@ -72,6 +75,7 @@ export const panel = {
     });
     const log = selectField("Log", [], { onchange: (value) => state.set({ "compare.log": value }) });
     const problem = el("p", { className: "error", role: "alert", hidden: true });
+    const job = jobView();
     const against = button("Put the noise models to this log", judge);
     const judged = el(
       "section",
@@ -79,6 +83,7 @@ export const panel = {
       el("h2", null, "Against a log"),
       log,
       el("div", { className: "row" }, against),
+      job,
       problem,
     );
     const plot = figure({
@@ -208,6 +213,7 @@ export const panel = {
                     "Noise model against the log",
                     ...all.map((it) => (it.against ? `${it.against.verdict} (${it.against.log})` : "–")),
                   ],
+                  ["ln L of the log's last third, foretold", ...all.map((it) => number(it.against?.likelihood, 9))],
                 ]
               : []),
           ],
@@ -253,14 +259,20 @@ export const panel = {
       const all = pins();
       for (const it of all) {
         try {
-          const own = log.input.value === state.get("log");
-          const job = await api.run(
-            "compare",
-            { params: "draft:params.json", log: log.input.value, ...(own ? { reading: reading() } : {}) },
-            { drafts: { "params.json": it.params } },
-          );
-          const document = await api.document_(job.id);
-          it.against = { log: log.input.value, verdict: document.verdict, meaning: document.meaning };
+          const name = log.input.value;
+          const how = name === state.get("log") ? { reading: reading() } : {};
+          // the log is of the sensor alone, whatever the plant is
+          const drafts = { "params.json": { ...it.params, design: undefined } };
+          /** @param {string} command @param {any} request */
+          const told = async (command, request) =>
+            api.document_((await api.run(command, { ...request, ...how }, { drafts, onJob: job.update })).id);
+          const { verdict } = await told("compare", { params: "draft:params.json", log: name });
+          const ranked = await told("rank", {
+            files: ["draft:params.json", name],
+            held_out: HELD_OUT,
+            flicker_horizon: SLOWEST,
+          });
+          it.against = { log: name, verdict, likelihood: ranked.designs[0].held_out_log_likelihood };
         } catch (error) {
           problem.hidden = false;
           problem.textContent = `${it.name}: ${/** @type {Error} */ (error).message}`;

@@ -417,8 +417,8 @@ export const panel = {
               rows: check.findings.map((/** @type {any} */ f) => [
                 el("span", { className: f.serious ? "bad" : "" }, f.serious ? `${f.kind}, serious` : f.kind),
                 f.axis ?? "all",
-                f.first_s > 0 ? `${number(f.first_s)} s` : "",
-                f.message.replace(/`(start|end)`/g, "$1"),
+                f.first_s > 0 ? `${number(f.first_s)}\u00a0s` : "",
+                f.message.replace(/`(\w+)`/g, "$1"),
               ]),
             }),
       );

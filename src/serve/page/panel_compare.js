@@ -16,8 +16,8 @@ const HELD_OUT = 1 / 3;
 const SLOWEST = 1e4;
 
 /** @typedef {{name: string, plant: string, axes: import("./panel_design.js").AxisResult[], verdict: string,
- * params: any, unsaved: any,
- *   view: Record<string, string>, colour?: number, against?: {log: string, verdict: string, likelihood: number}}} Pin */
+ *   params: any, unsaved: any, view: Record<string, string>, colour?: number,
+ *   against?: {log: string, verdict: string, likelihood: number}}} Pin */
 
 /** @returns {Pin[]} */
 const pins = () => kept(STORE) ?? [];

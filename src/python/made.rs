@@ -150,7 +150,7 @@ pub(crate) fn make(name: &str, request: &str) -> anyhow::Result<Made> {
         "fly" => row!(fly::run(&asked(request)?, true)?; d => d.report; view::fly::fly(&d.report, &d.header,
             d.lines.as_ref(), &d.stops); Some(format!("Flight of {}", d.report.airplane))),
         "loop" => row!(closed_loop::run(&asked(request)?, true)?; d => d.judged.document; view::closed_loop::
-            closed_loop(&d.judged, &d.corners); Some(format!("Control loop of {}", d.judged.document.airplane))),
+            closed_loop(&d.judged, &d.drawn); Some(format!("Control loop of {}", d.judged.document.airplane))),
         "tune" => match tune::run(&asked(request)?)? {
             tune::Done::Linear(done) => row!(done; d => d.document()?; view::tune::tune(&d.shown());
                 Some("Tuned filter".into()); d.tuned.design.to_json()),

@@ -161,6 +161,7 @@ fn answer<'a>(document: &LoopDocument, failed: &[&Judgement], about: String) -> 
     Section::new(about)
         .table("", &ANSWER, rows)
         .paragraphs(worst)
+        .paragraphs(varied::briefly(document))
         .findings("warning", super::answer::warnings(document.warnings.clone()))
 }
 

@@ -237,11 +237,12 @@ pub struct Course {
     pub samples: Vec<(f64, [f64; 2], [f64; 2])>,
 }
 
-/// The first flight of every feed in `plan`, with the bias of its gyros; one that cannot be flown on ends there.
+/// The first flight of every feed in `plan`; one that cannot be flown on ends there.
 pub fn one(judged: &Judged, plan: &Plan, seed: u64) -> Vec<Course> {
+    let plan = plan.clone().without_bias();
     let course = |feed: &Feed| {
         let mut samples = Vec::new();
-        let _ = fly(plan, judged, feed, (seed, 0), |time, [along, across], truth| {
+        let _ = fly(&plan, judged, feed, (seed, 0), |time, [along, across], truth| {
             samples.push((time, [along[ANGLE], across[ANGLE]], [truth.surfaces[0], truth.surfaces[1]]));
         });
         Course { feed: feed.name.clone(), samples }
@@ -255,8 +256,10 @@ pub fn flown(judged: &Judged, plan: &Plan, runs: u64, seed: u64) -> Result<Flown
     let needed = needed(&judged.raw, plan.duration())?;
     let jobs: Vec<(u64, usize)> =
         (0..runs).flat_map(|run| (0..judged.feeds.len()).map(move |feed| (run, feed))).collect();
-    let outcomes: Vec<Result<Outcome, FlightError>> =
-        jobs.par_iter().map(|(run, feed)| fly(&plan, judged, &judged.feeds[*feed], (seed, *run), |_, _, _| {})).collect();
+    let outcomes: Vec<Result<Outcome, FlightError>> = jobs
+        .par_iter()
+        .map(|(run, feed)| fly(&plan, judged, &judged.feeds[*feed], (seed, *run), |_, _, _| {}))
+        .collect();
     let mut by_feed: Vec<Vec<Outcome>> = judged.feeds.iter().map(|_| Vec::new()).collect();
     for ((run, feed), outcome) in jobs.iter().zip(outcomes) {
         let name = &judged.feeds[*feed].name;

@@ -111,8 +111,8 @@ fn flight<'a>(judged: &'a Judged, drawn: &'a Drawn) -> Option<Section<'a>> {
         Ok(courses) => Some(
             section
                 .figure(
-                    "In six degrees of freedom, the same gusts and noise for every feed, gyros with their bias: what it \
-                     does, and how a filter learns it.",
+                    "In six degrees of freedom, the same gusts and noise for every feed; what the gyros' constant bias \
+                     does is the offset of the tables.",
                     || angle(judged, courses, 0),
                 )
                 .figure("", || angle(judged, courses, 1))

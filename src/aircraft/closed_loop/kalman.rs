@@ -471,8 +471,8 @@ pub fn airspeed_of(path: &Path) -> Result<Option<f64>, LoopError> {
     Ok(design.tuning["flight"]["airspeed_m_s"].as_f64())
 }
 
-/// The same by filter.json of the plant airplane. Errors: another plant, rate or gyro, an axis that is missing, commands
-/// and measurements of another half.
+/// The same by filter.json of the plant airplane. Errors: another plant, rate or gyro, an axis that is missing,
+/// commands and measurements of another half.
 pub fn airframe_of(setting: &Setting, half: Half, path: &Path) -> Result<HalfFeed, LoopError> {
     let design = FilterDesign::read(path).map_err(|e| LoopError(format!(".filter: {e}")))?;
     let wrong = |message: String| LoopError(format!(".filter: {}: {message}", path.display()));

@@ -105,8 +105,8 @@ impl Plant {
         let registers: Vec<usize> = delays.iter().map(|(whole, part)| whole + usize::from(*part > 0.0)).collect();
         if let Some(late) = registers.iter().find(|late| **late > MOST_DELAY) {
             return Err(LoopError(format!(
-                "autopilot.delay: found {late} samples from measurement to servo; expected at most {MOST_DELAY}, each of \
-                 which is a state of the loop: lower the delay, or autopilot.rate"
+                "autopilot.delay: found {late} samples from measurement to servo; expected at most {MOST_DELAY}, each \
+                 of which is a state of the loop: lower the delay, or autopilot.rate"
             )));
         }
         let all = n + registers.iter().sum::<usize>();

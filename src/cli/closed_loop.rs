@@ -50,7 +50,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     if let Some(path) = &args.junit {
         atomic::write(path, junit::of_loop(&done.judged.document)?.as_bytes())?;
     }
-    let mut report = view::closed_loop::closed_loop(&done.judged, &done.corners);
+    let mut report = view::closed_loop::closed_loop(&done.judged, &done.drawn);
     args.plot.write(&report.title, &report)?;
     files::write_page(args.report.as_deref(), &report)?;
     let status = if done.judged.passes() { Status::Done } else { Status::CheckFailed };

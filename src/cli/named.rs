@@ -171,7 +171,7 @@ pub fn make(name: &str, request: &str) -> anyhow::Result<Made> {
         "fly" => row!(fly::run(&asked(request)?, true)?; d => d.report; view::fly::fly(&d.report, &d.header,
             d.lines.as_ref(), &d.stops); Some(format!("Flight of {}", d.report.airplane))),
         "loop" => row!(closed_loop::run(&asked(request)?, true)?; d => d.judged.document;
-            view::closed_loop::closed_loop(&d.judged, &d.corners);
+            view::closed_loop::closed_loop(&d.judged, &d.drawn);
             Extra { title: Some(format!("Control loop of {}", d.judged.document.airplane)),
                 curves: Some(Box::new(|| view::closed_loop::curves(&d.judged))) }),
         "tune" => match tune::run(&asked(request)?)? {

@@ -326,7 +326,10 @@ fn predict(n: usize, joint: &Joint, columns: &mut [f64], before: &mut [f64]) {
         for i in 0..n {
             column[i] = diagonal[i] * before[i];
         }
-        for &(i, j, f) in &joint.coupling {
+    }
+    // columns within: no sum waits for the one before it
+    for &(i, j, f) in &joint.coupling {
+        for (column, before) in columns.chunks_exact_mut(n).zip(before.chunks_exact(n)) {
             column[i] += f * before[j];
         }
     }

@@ -40,11 +40,11 @@ pub(super) struct Law {
 struct Link {
     /// Coordinates of the error that are followed.
     size: usize,
-    /// Row-major, `size` × that of the epoch before.
+    /// By columns (no sum then waits for the one before it), `size` × that of the epoch before.
     transition: Vec<f64>,
     /// Root C of P' − Φ P Φᵀ, columns of zero variance left out: by columns.
     fresh: Vec<Vec<f64>>,
-    /// W B: row-major, r × `size`.
+    /// W B: by columns, r × `size`.
     judged: Vec<f64>,
     /// Judged components that no other epoch knows of: independent N(0, 1).
     rest: usize,
@@ -169,9 +169,9 @@ impl Law {
                 fresh: columns
                     .map(|(i, v)| eigen.eigenvectors.column(i).iter().map(|x| x * v.sqrt()).collect())
                     .collect(),
-                transition: transition.transpose().iter().copied().collect(),
+                transition: transition.iter().copied().collect(),
                 rest: if judged.nrows() == axis.gains.states { judged.nrows() - to.nrows() } else { 0 },
-                judged: judged.transpose().iter().copied().collect(),
+                judged: judged.iter().copied().collect(),
                 regular: course.regular,
             });
             (before, from_before) = (covariance, from);
@@ -209,7 +209,7 @@ impl Law {
             Drawn { nees: Vec::with_capacity(self.links.len()), mean_error: Vec::with_capacity(self.links.len()) };
         // the mean, then the columns of all other runs
         let (mut columns, mut before) = (Vec::new(), 0);
-        let mut spare: Vec<f64> = Vec::new();
+        let (mut spare, mut judged): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
         for link in &self.links {
             let n = link.size;
             let count = columns.len().checked_div(before).unwrap_or(1);
@@ -217,12 +217,9 @@ impl Law {
             spare.resize(count * n, 0.0);
             for (c, column) in spare.chunks_exact_mut(n.max(1)).enumerate() {
                 let old = &columns[c * before..(c + 1) * before];
-                for (i, out) in column.iter_mut().enumerate() {
-                    *out = link.transition[i * before..][..before].iter().zip(old).map(|(f, x)| f * x).sum();
-                }
+                add(column, &link.transition, old.iter().copied());
                 for fresh in &link.fresh {
-                    let draw = normal(rng);
-                    column.iter_mut().zip(fresh).for_each(|(x, c)| *x += c * draw);
+                    add(column, fresh, [normal(rng)].into_iter());
                 }
             }
             std::mem::swap(&mut columns, &mut spare);
@@ -238,8 +235,10 @@ impl Law {
                 }
             }
             let power = |column: &[f64]| -> f64 {
-                let rows = link.judged.chunks_exact(n.max(1));
-                rows.map(|row| row.iter().zip(column).map(|(j, x)| j * x).sum::<f64>().powi(2)).sum()
+                judged.clear();
+                judged.resize(link.judged.len() / n.max(1), 0.0);
+                add(&mut judged, &link.judged, column.iter().copied());
+                judged.iter().map(|u| u.powi(2)).sum()
             };
             let mut powers = columns.chunks_exact(n.max(1)).map(power);
             let of_mean = powers.next().unwrap_or(0.0) + chi_square(link.rest as u64, rng);
@@ -248,6 +247,13 @@ impl Law {
             before = n;
         }
         drawn
+    }
+}
+
+/// `sum` += A x, A given by columns.
+fn add(sum: &mut [f64], columns: &[f64], x: impl Iterator<Item = f64>) {
+    for (column, x) in columns.chunks_exact(sum.len().max(1)).zip(x) {
+        sum.iter_mut().zip(column).for_each(|(sum, a)| *sum += a * x);
     }
 }
 
@@ -278,20 +284,20 @@ fn wishart(link: &Link, free: u64, n: usize, columns: &mut Vec<f64>, rng: &mut C
 /// The n columns of a triangular L with L Lᵀ = X Xᵀ, X given by its columns.
 fn triangle(n: usize, x: &[f64], l: &mut [f64]) {
     l.fill(0.0);
-    for i in 0..n {
-        for j in 0..=i {
-            let mut sum: f64 = x.chunks_exact(n).map(|column| column[i] * column[j]).sum();
-            for k in 0..j {
-                sum -= l[k * n + i] * l[k * n + j];
-            }
-            l[j * n + i] = if i == j {
-                sum.max(0.0).sqrt()
-            } else if l[j * n + j] > 0.0 {
-                sum / l[j * n + j]
-            } else {
-                0.0
-            };
+    for column in x.chunks_exact(n) {
+        for j in 0..n {
+            add(&mut l[j * n + j..][..n - j], &column[j..], [column[j]].into_iter());
         }
+    }
+    for j in 0..n {
+        let (before, rest) = l.split_at_mut(j * n);
+        let own = &mut rest[j..n];
+        for column in before.chunks_exact(n) {
+            add(own, &column[j..], [-column[j]].into_iter());
+        }
+        let root = own[0].max(0.0).sqrt();
+        own.iter_mut().for_each(|x| *x = if root > 0.0 { *x / root } else { 0.0 });
+        own[0] = root;
     }
 }
 

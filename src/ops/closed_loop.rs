@@ -7,8 +7,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::amounts::{whole, with_unit};
-use crate::aircraft::closed_loop::curves::{Corner, corners};
-use crate::aircraft::closed_loop::flights::{flown, needed};
+use crate::aircraft::closed_loop::curves::{Drawn, corners};
+use crate::aircraft::closed_loop::flights::{flown, needed, one};
 use crate::aircraft::closed_loop::optimize::{again, optimize};
 use crate::aircraft::closed_loop::rule::resolved;
 use crate::aircraft::closed_loop::schedule::price;
@@ -80,8 +80,7 @@ impl Request {
 #[derive(Debug)]
 pub struct Done {
     pub judged: Judged,
-    /// What a low-pass of any corner would do, where figures ask for it.
-    pub corners: Vec<Corner>,
+    pub drawn: Drawn,
 }
 
 /// `figures`: also what only figures show. Errors: one line each, with the file.
@@ -113,17 +112,21 @@ pub fn run(request: &Request, figures: bool) -> anyhow::Result<Done> {
         judged.document.optimized = Some(optimized);
         better = Some(feeds);
     }
-    if let Some(runs) = request.montecarlo {
-        if !(2..=MOST_CASES).contains(&runs) {
-            bail!("`montecarlo` {runs}: expected 2 to {MOST_CASES} flights");
-        }
+    let plan = || -> anyhow::Result<Plan> {
         let duration = with_unit("`duration`", &request.duration, Dimension::TIME, "60s")?;
         let times = Times { duration, every: None, step: None };
         let (document, path) = match (&truth, &request.truth) {
             (Some(truth), Some(path)) => (truth, path),
             _ => (&flight, &request.flight),
         };
-        let plan = Plan::new(document, folder(path), &times).map_err(|e| named(e.into()))?;
+        Plan::new(document, folder(path), &times).map_err(|e| named(e.into()))
+    };
+    if let Some(runs) = request.montecarlo {
+        if !(2..=MOST_CASES).contains(&runs) {
+            bail!("`montecarlo` {runs}: expected 2 to {MOST_CASES} flights");
+        }
+        let plan = plan()?;
+        let duration = plan.duration();
         if let Some(feeds) = better {
             // flights that the first seed has not seen
             let again = again(&judged, feeds, &plan, runs, request.seed.wrapping_add(1)).map_err(named)?;
@@ -139,8 +142,13 @@ pub fn run(request: &Request, figures: bool) -> anyhow::Result<Done> {
         judged.document.paired = std::mem::take(&mut flown.paired);
         judged.document.flights = Some(flown);
     }
-    let corners = if figures { corners(&judged.setting, &judged.truth).map_err(named)? } else { Vec::new() };
-    Ok(Done { judged, corners })
+    let mut drawn = Drawn::NONE;
+    if figures {
+        drawn.corners = corners(&judged.setting, &judged.truth).map_err(named)?;
+        // a loop that is judged has its page, whether it can be flown for so long or not
+        drawn.flight = plan().map(|plan| one(&judged, &plan, request.seed)).map_err(|e| LoopError(format!("{e:#}")));
+    }
+    Ok(Done { judged, drawn })
 }
 
 /// A flight with the gains that its rule gives.

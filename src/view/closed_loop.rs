@@ -5,7 +5,7 @@ mod varied;
 
 pub use self::figures::curves;
 use crate::aircraft::closed_loop::Judged;
-use crate::aircraft::closed_loop::curves::Corner;
+use crate::aircraft::closed_loop::curves::Drawn;
 use crate::aircraft::closed_loop::document::{HalfDocument, LoopDocument, MarginDocument};
 use crate::aircraft::closed_loop::verdict::{Judgement, shown};
 use crate::report::{Conclusion, Level, Report, Section};
@@ -14,9 +14,8 @@ use crate::units::digits;
 /// Sentences on failed feeds in the short answer: of two lines each, beside a table of four feeds.
 const MOST_SENTENCES: usize = 2;
 
-/// The verdict, a table of each half, and what is to be said of it; `corners`: what a low-pass of any corner would do,
-/// for the figures.
-pub fn closed_loop<'a>(judged: &'a Judged, corners: &'a [Corner]) -> Report<'a> {
+/// The verdict, a table of each half, and what is to be said of it; `drawn`: what figures alone show.
+pub fn closed_loop<'a>(judged: &'a Judged, drawn: &'a Drawn) -> Report<'a> {
     let document = &judged.document;
     let flight = &document.flight;
     let wind =
@@ -59,7 +58,7 @@ pub fn closed_loop<'a>(judged: &'a Judged, corners: &'a [Corner]) -> Report<'a> 
     sections.extend(document.spread.as_ref().map(varied::spread));
     sections.extend(document.optimized.as_ref().map(varied::optimized));
     sections.extend(document.flights.as_ref().map(|flown| varied::flights(flown, &document.paired)));
-    sections.extend(figures::sections(judged, corners));
+    sections.extend(figures::sections(judged, drawn));
     let (kept, all) = (document.criteria.len() - failed.len(), document.criteria.len());
     let verdict = (document.verdict != "none").then(|| Conclusion {
         word: document.verdict.into(),
@@ -163,6 +162,7 @@ fn answer<'a>(document: &LoopDocument, failed: &[&Judgement], about: String) -> 
     Section::new(about)
         .table("", &ANSWER, rows)
         .paragraphs(worst)
+        .paragraphs(varied::briefly(document))
         .findings("warning", super::answer::warnings(document.warnings.clone()))
 }
 

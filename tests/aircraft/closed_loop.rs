@@ -341,6 +341,20 @@ fn a_bias_turns_the_airplane() {
     let of = |name: &str| steady.offset.iter().find(|(known, _)| known == name).unwrap().1.to_degrees();
     assert!((of("r").abs() - 1.31).abs() < 0.1, "{}", of("r"));
     assert_eq!(steady.removed, None, "nothing removes it");
+    // a filter does: second by second as x⁺ = A x + b has it
+    let all = results(&flight(MODERATE, "15 kt", json!([{ "type": "drift" }])));
+    let half = &all[0].halves[1];
+    let (mut x, mut angles) = (half.circuit.bias.clone() * 0.0, Vec::new());
+    for k in 0..360_000 {
+        if k % 100 == 0 {
+            angles.push(x[3].abs());
+        }
+        x = &half.circuit.a * x + &half.circuit.bias;
+    }
+    let largest = angles.iter().copied().fold(0.0, f64::max);
+    let after = angles.iter().rposition(|angle| *angle > 0.1 * largest).unwrap() + 1;
+    let removed = half.steady.as_ref().unwrap().removed.unwrap();
+    assert!((removed - after as f64).abs() <= 1.0 && removed > 5.0, "{removed} {after}");
 }
 
 /// Ten times the white noise: what a filter is worth then.

@@ -107,6 +107,40 @@ fn a_slow_servo_is_flagged_in_severe_turbulence() {
     assert!(!usual.iter().any(|w| w.contains("saturates")), "{usual:?}");
 }
 
+/// Surfaces that do more than modelled: of a loop with little gain to spare, and of a filter that knows the command.
+#[test]
+fn surfaces_that_do_more_are_flagged() {
+    let feeds = json!([{ "type": "raw" }, low(2, 5.0), { "type": "airframe" }]);
+    let warnings = judged(&flight(TIGHT, "15 kt", feeds)).document.warnings;
+    let said = |start: &str, part: &str| warnings.iter().any(|w| w.starts_with(start) && w.contains(part));
+    // 3.63 and 4.91 dB of the sheet
+    assert!(said("LP2 5 Hz, elevator: a surface 51", "makes the loop oscillate"), "{warnings:?}");
+    assert!(said("LP2 5 Hz, aileron: a surface 75", "makes the loop oscillate"), "{warnings:?}");
+    assert!(said("airframe KF, pitch: with surfaces 25 % more effective", "falls from 0.592"), "{warnings:?}");
+    assert!(!warnings.iter().any(|w| w.starts_with("raw")), "{warnings:?}");
+}
+
+/// A vibration line of the gyro rings as lightly as it likes: it is no motion of the airplane, and no damping is asked
+/// of it.
+#[test]
+fn a_line_of_the_gyro_is_no_motion_of_the_airplane() {
+    let mut document = flight(MODERATE, "15 kt", json!([{ "type": "raw" }, { "type": "airframe" }]));
+    let least = |document: &Value| {
+        let feeds = judged(document).document.feeds;
+        feeds.iter().map(|feed| feed.pitch.least_damped.as_ref().unwrap().damping).collect::<Vec<_>>()
+    };
+    let quiet = least(&document);
+    let mut gyro = gyro(1.0);
+    for axis in gyro["axes"].as_array_mut().unwrap() {
+        axis["oscillation"] = json!([{ "std_dev": "0.01 deg/s", "frequency": "17 Hz", "correlation_time": "10 s" }]);
+    }
+    document["sensors"]["gyro"] = gyro;
+    let (loud, modes) = (least(&document), judged(&document).document.feeds[0].pitch.modes.len());
+    assert!((loud[0] - quiet[0]).abs() < 1e-9 && (loud[1] - quiet[1]).abs() < 0.02, "{quiet:?} {loud:?}");
+    let rings = |mode: &kfdesign::aircraft::closed_loop::document::LoopModeDocument| mode.damping.abs() < 1e-3;
+    assert!(judged(&document).document.feeds[0].pitch.modes.iter().any(rings), "{modes}");
+}
+
 /// Optimal gains on estimates without recovery.
 #[test]
 fn lqg_is_flagged() {
@@ -197,6 +231,11 @@ fn a_drift_filter_of_tune() {
         let [made, read] = [0, 1].map(|i| found["feeds"][i]["pitch"]["rms"][name]["all"].as_f64().unwrap());
         assert!((made / read - 1.0).abs() < 1e-6, "{name}: {made}, {read}");
     }
+    // the sheet: with an aid of 2 deg at 1 Hz the whole drift is known to 0.18 deg/s after 10 s, to 0.018 after 100 s
+    let known = &found["feeds"][1]["pitch"]["known"][0];
+    for (key, expected) in [("after_10_s", 0.18), ("after_100_s", 0.018)] {
+        assert!((known[key].as_f64().unwrap() / expected - 1.0).abs() < 0.15, "{known}");
+    }
 }
 
 #[test]
@@ -211,11 +250,17 @@ fn sweeps_say_where_the_best_filter_changes() {
     // the louder the gyro, the less the raw one is worth
     let mut limits = document(TIGHT);
     limits["criteria"] = json!({ "damping": { "at_least": 0.4 } });
+    limits["uncertainty"] = json!({ "aerodynamics": "10 %" });
     bench.file("noise.json", limits.to_string());
     let found: Value = serde_json::from_str(&bench.run("loop noise.json --sweep noise --json").stdout).unwrap();
     let best = |i: usize| found["sweep"]["points"][i]["best"].as_str().unwrap().to_string();
     assert!(best(0) != "airframe KF" && best(6) == "airframe KF", "{} {}", best(0), best(6));
     assert!(!found["sweep"]["changes"].as_array().unwrap().is_empty());
+    // the short answer says what was asked for
+    let out = bench.run("loop noise.json --sweep noise --spread 4 --montecarlo 2 --duration 20s");
+    for part in ["Over the noise: between ", "Of 4 drawn airplanes", "2 flights: "] {
+        assert!(out.stdout.contains(part), "{out:?}");
+    }
 }
 
 #[test]
@@ -230,6 +275,13 @@ fn a_spread_counts_what_is_kept() {
     let stable = kept.iter().find(|k| k["feed"] == "raw" && k["criterion"] == "stable").unwrap();
     assert_eq!(stable["share"], 1.0);
     assert!(stable["lower"].as_f64().unwrap() > 0.9);
+    // moderate gains have a disk margin of 1.219 in pitch: one of 1.2 is kept by some of the drawn airplanes
+    document["criteria"] = json!({ "disk_margin": { "at_least": 1.2 } });
+    bench.file("some.json", document.to_string());
+    let some: Value = serde_json::from_str(&bench.run("loop some.json --spread 40 --seed 3 --json").stdout).unwrap();
+    let kept = some["spread"]["kept"].as_array().unwrap();
+    let share = kept.iter().find(|k| k["feed"] == "raw" && k["criterion"] == "disk margin at least of elevator");
+    assert!((0.2..0.98).contains(&share.unwrap()["share"].as_f64().unwrap()), "{share:?}");
     assert_eq!(found, serde_json::from_str::<Value>(&run()).unwrap(), "a seed is a result");
     document["uncertainty"] = json!({});
     bench.file("sure.json", document.to_string());
@@ -268,6 +320,8 @@ fn what_is_refused() {
             vec!["autopilot.gains.kq", "drives the pitch rate on", "positive"],
         ),
         (with("/autopilot/gains/kphi", json!(-0.9)), vec!["autopilot.gains.kphi", "bank angle", "positive"]),
+        (with("/autopilot/delay", json!(100_000)), vec!["autopilot.delay", "100000 samples", "at most 100"]),
+        (with("/autopilot/rate", json!("1 MHz")), vec!["autopilot.rate", "found 1.000e6 Hz", "at most 40000 Hz"]),
         (with("/trim/airspeed", json!("12 m/s")), vec!["trim", "no elevator"]),
         (with("/trim/airspeed", json!("60 m/s")), vec!["trim", "no thrust"]),
         (with("/feeds/2", json!({ "type": "raw" })), vec!["feeds[2]", "'raw' is the name of feeds[0] too"]),

@@ -99,6 +99,55 @@ fn command_end_to_end() {
     assert_eq!(bench.run("replay wrong.json log.csv --allow-inconclusive").status, 1);
 }
 
+/// What the model is linear about is taken off on every road: whole stretches, row by row and smoothed, a log 0.1 rad/s
+/// higher gives the numbers of the log itself, but for the rounding of 0.1.
+#[test]
+fn about_is_taken_off() {
+    let bench = crate::support::Bench::new();
+    let right = skydog(0.1, 1.0, 1.0, 1.0);
+    let log = draw(&right, 5, 9000);
+    bench.file("filter.json", right.to_json());
+    bench.file("log.csv", log_text(&log, 0.1));
+    let mut about: serde_json::Value = serde_json::from_str(&right.to_json()).unwrap();
+    about["axes"][0]["about"] = serde_json::json!({ right.axes[0].model.measurements[0].name.as_str(): 0.1 });
+    bench.file("about.json", about.to_string());
+    bench.file("higher.csv", log_text(&log.iter().map(|z| z + 0.1).collect::<Vec<_>>(), 0.1));
+    for more in ["", "-o NAME", "-o NAME --innovations", "-o NAME --smooth"] {
+        let replay = |filter: &str, log: &str, name: &str| -> (serde_json::Value, Vec<f64>) {
+            let flags = more.replace("NAME", name);
+            let out = bench.run(&format!("replay {filter} {log} {flags} --json --allow-inconclusive"));
+            let rows = if flags.is_empty() { String::new() } else { bench.read(name) };
+            let numbers = rows.lines().skip(1).flat_map(|l| l.split(',').map(|c| c.parse().unwrap()));
+            (serde_json::from_str(&out.stdout).unwrap(), numbers.collect())
+        };
+        let (plain, rows) = replay("filter.json", "log.csv", "plain.csv");
+        let (shifted, others) = replay("about.json", "higher.csv", "shifted.csv");
+        for key in ["nis", "log_likelihood", "whiteness"] {
+            let ([a, b], mut numbers) = ([&plain, &shifted].map(|found| &found["axes"][0][key]), 0);
+            near(a, b, key, &mut numbers);
+            assert!(numbers > 0, "{more}: {key}");
+        }
+        assert_eq!(rows.len(), others.len());
+        assert_eq!(rows.is_empty(), more.is_empty());
+        let differs = rows.iter().zip(&others).find(|(a, b)| (**a - **b).abs() > 1e-9);
+        assert_eq!(differs, None, "{more}");
+    }
+}
+
+/// Every number within 1e-9 of its size; how many there are.
+fn near(a: &serde_json::Value, b: &serde_json::Value, at: &str, numbers: &mut u32) {
+    use serde_json::Value::{Array, Number, Object};
+    match (a, b) {
+        (Number(x), Number(y)) => {
+            *numbers += 1;
+            assert_relative_eq!(x.as_f64().unwrap(), y.as_f64().unwrap(), max_relative = 1e-9, epsilon = 1e-9);
+        }
+        (Object(x), Object(y)) => x.iter().for_each(|(key, value)| near(value, &y[key], key, numbers)),
+        (Array(x), Array(y)) => x.iter().zip(y).for_each(|(x, y)| near(x, y, at, numbers)),
+        _ => assert_eq!(a, b, "{at}"),
+    }
+}
+
 /// `--smooth` over a gap and an outlier: the filtered columns are those of the plain output, to the bit; sigmas
 /// shrink, at the last sample nothing does.
 #[test]

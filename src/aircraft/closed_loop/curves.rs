@@ -6,6 +6,7 @@ use super::LoopError;
 use super::analysis::{FeedResult, HalfResult, gust_of, loop_gain, of_feed, response};
 use super::feed::{Designed, Feed, Kind};
 use super::filters::lowpass;
+use super::flights::Course;
 use super::half::{ANGLE, Half};
 use super::half_feed::raw;
 use crate::aircraft::flight::Setting;
@@ -31,6 +32,19 @@ pub fn gust_answer(truth: &Setting, half: &HalfResult) -> Vec<(f64, f64)> {
     let gust = gust_of(truth, half.circuit.half);
     let course = response(&half.circuit, &half.circuit.command, Some(&gust));
     course.iter().enumerate().map(|(k, x)| (k as f64 * half.circuit.interval, x[ANGLE])).collect()
+}
+
+/// What only figures show.
+#[derive(Clone, Debug)]
+pub struct Drawn {
+    pub corners: Vec<Corner>,
+    /// One flight of every feed, or why there is none.
+    pub flight: Result<Vec<Course>, LoopError>,
+}
+
+impl Drawn {
+    /// Where nothing is drawn.
+    pub const NONE: Drawn = Drawn { corners: Vec::new(), flight: Ok(Vec::new()) };
 }
 
 /// What a low-pass of order two does at a corner.

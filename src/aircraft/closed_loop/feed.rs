@@ -101,7 +101,9 @@ pub fn feed(setting: &Setting, entry: &FeedEntry, folder: &Path, at: f64) -> Res
             (Kind::Drift, both(|half| low(make(half)?, lowpass.as_ref(), setting, half))?)
         }
         FeedEntry::Airframe { filter: Some(path), lowpass, .. } => {
-            let make = |half: Half| kalman::airframe_of(setting, half, &folder.join(path));
+            let path = folder.join(path);
+            designed.airspeed = kalman::airspeed_of(&path)?;
+            let make = |half: Half| kalman::airframe_of(setting, half, &path);
             (Kind::Airframe, both(|half| low(make(half)?, lowpass.as_ref(), setting, half))?)
         }
         FeedEntry::Lqg { longitudinal, lateral, recovery, bias_walk, .. } => {

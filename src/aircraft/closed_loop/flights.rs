@@ -2,7 +2,7 @@
 //! differences need few flights.
 //!
 //! A flight begins in trim with its filters at rest and is judged after its first sixth. Gyros have no constant bias
-//! here: what it does is the offset of the exact analysis. Root mean squares are of deviations from the trim.
+//! then: what it does is the offset of the exact analysis. Root mean squares are of deviations from the trim.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -12,7 +12,7 @@ use super::analysis::FeedResult;
 use super::circuit::{Circuit, controller, law};
 use super::feed::{Feed, Kind};
 use super::flown::{Consistency, Flown, Linear, Paired};
-use super::half::{AIRFRAME, Half};
+use super::half::{AIRFRAME, ANGLE, Half};
 use super::half_feed::{HalfFeed, Kalman};
 use super::judged::Judged;
 use crate::aircraft::control::response::StateSpace;
@@ -137,7 +137,14 @@ struct Outcome {
     consistency: [[f64; 2]; 2],
 }
 
-fn fly(plan: &Plan, judged: &Judged, feed: &Feed, seed: u64, run: u64) -> Result<Outcome, FlightError> {
+/// `look` sees the deviations of every sample.
+fn fly(
+    plan: &Plan,
+    judged: &Judged,
+    feed: &Feed,
+    (seed, run): (u64, u64),
+    mut look: impl FnMut(f64, [[f64; AIRFRAME]; 2], &Truth),
+) -> Result<Outcome, FlightError> {
     checkpoint();
     let setting = &judged.setting;
     let running = |i: usize| Running::new(setting, Half::BOTH[i], &feed.halves[i], feed.kind);
@@ -147,10 +154,11 @@ fn fly(plan: &Plan, judged: &Judged, feed: &Feed, seed: u64, run: u64) -> Result
     let mut squares = [Moments::NONE; QUANTITIES.len()];
     let mut commander = Shared(&pilot);
     plan.fly_by(seed, run, &mut commander, |time, truth| {
+        let [along, across] = deviations(setting, truth.velocity, truth.rate, truth.angles);
+        look(time, [along, across], truth);
         if time < before {
             return;
         }
-        let [along, across] = deviations(setting, truth.velocity, truth.rate, truth.angles);
         let mut pilot = pilot.borrow_mut();
         pilot.halves[0].compare(along);
         pilot.halves[1].compare(across);
@@ -221,14 +229,37 @@ pub fn needed(raw: &FeedResult, duration: f64) -> Result<u64, LoopError> {
     Ok((of_normal * largest / WISHED).powi(2).ceil().max(2.0) as u64)
 }
 
+/// One flight of a feed.
+#[derive(Clone, Debug)]
+pub struct Course {
+    pub feed: String,
+    /// Of every sample: s; θ and φ less those of the trim, and the elevator and aileron, rad.
+    pub samples: Vec<(f64, [f64; 2], [f64; 2])>,
+}
+
+/// The first flight of every feed in `plan`; one that cannot be flown on ends there.
+pub fn one(judged: &Judged, plan: &Plan, seed: u64) -> Vec<Course> {
+    let plan = plan.clone().without_bias();
+    let course = |feed: &Feed| {
+        let mut samples = Vec::new();
+        let _ = fly(&plan, judged, feed, (seed, 0), |time, [along, across], truth| {
+            samples.push((time, [along[ANGLE], across[ANGLE]], [truth.surfaces[0], truth.surfaces[1]]));
+        });
+        Course { feed: feed.name.clone(), samples }
+    };
+    judged.feeds.par_iter().map(course).collect()
+}
+
 /// `runs` flights of every feed in `plan`, which is the flight of the truth. Errors: a flight that cannot be flown.
 pub fn flown(judged: &Judged, plan: &Plan, runs: u64, seed: u64) -> Result<Flown, LoopError> {
     let plan = plan.clone().without_bias();
     let needed = needed(&judged.raw, plan.duration())?;
     let jobs: Vec<(u64, usize)> =
         (0..runs).flat_map(|run| (0..judged.feeds.len()).map(move |feed| (run, feed))).collect();
-    let outcomes: Vec<Result<Outcome, FlightError>> =
-        jobs.par_iter().map(|(run, feed)| fly(&plan, judged, &judged.feeds[*feed], seed, *run)).collect();
+    let outcomes: Vec<Result<Outcome, FlightError>> = jobs
+        .par_iter()
+        .map(|(run, feed)| fly(&plan, judged, &judged.feeds[*feed], (seed, *run), |_, _, _| {}))
+        .collect();
     let mut by_feed: Vec<Vec<Outcome>> = judged.feeds.iter().map(|_| Vec::new()).collect();
     for ((run, feed), outcome) in jobs.iter().zip(outcomes) {
         let name = &judged.feeds[*feed].name;

@@ -115,18 +115,7 @@ pub fn drift_of(setting: &Setting, half: Half, walk: f64, path: &Path) -> Result
                 .or(axes.get(number))
                 .ok_or_else(|| wrong(format!("has no axis {letter}; tune one of three axes, or of one for all")))?,
         };
-        if let Some(params) = &setting.gyro {
-            let [theirs, ours] = [&axis.noise, &params.axes[number]].map(|axis| axis.noise().white_density());
-            if ours > 0.0 && theirs > 0.0 && !(1.0 / OTHER_GYRO..=OTHER_GYRO).contains(&(theirs / ours)) {
-                return Err(wrong(format!(
-                    "axis {}: made for a gyro of {} deg/s/sqrt(Hz), that of sensors.gyro has {}; tune it with these \
-                     parameters",
-                    axis.name,
-                    digits(theirs.to_degrees()),
-                    digits(ours.to_degrees())
-                )));
-            }
-        }
+        of_same_gyro(axis, setting, number).map_err(&wrong)?;
         let mut model = axis.model.clone();
         // an aid at a lower rate is one at every sample with the same density
         let every = model.every.clone();
@@ -166,6 +155,21 @@ fn of_same_rate(design: &FilterDesign, setting: &Setting) -> Result<(), String> 
         "sample_rate: {} Hz, the autopilot has {} Hz; tune a filter of its rate",
         digits(design.sample_rate_hz),
         digits(setting.rate)
+    ))
+}
+
+/// `number`: of the gyro that the filter of an axis has.
+fn of_same_gyro(axis: &AxisDesign, setting: &Setting, number: usize) -> Result<(), String> {
+    let Some(params) = &setting.gyro else { return Ok(()) };
+    let [theirs, ours] = [&axis.noise, &params.axes[number]].map(|axis| axis.noise().white_density());
+    if !(ours > 0.0 && theirs > 0.0) || (1.0 / OTHER_GYRO..=OTHER_GYRO).contains(&(theirs / ours)) {
+        return Ok(());
+    }
+    Err(format!(
+        "axis {}: made for a gyro of {} deg/s/sqrt(Hz), that of sensors.gyro has {}; tune it with these parameters",
+        axis.name,
+        digits(theirs.to_degrees()),
+        digits(ours.to_degrees())
     ))
 }
 
@@ -461,8 +465,14 @@ pub fn airframe(setting: &Setting, half: Half, walk: f64) -> Result<HalfFeed, Lo
     Ok(of_airframe(half, Kalman::new(half.name(), model)?))
 }
 
-/// The same by filter.json of the plant airplane. Errors: another plant or rate, an axis that is missing, commands and
-/// measurements of another half.
+/// The airspeed (m/s) that a filter.json of the plant airplane was made for, where it says so.
+pub fn airspeed_of(path: &Path) -> Result<Option<f64>, LoopError> {
+    let design = FilterDesign::read(path).map_err(|e| LoopError(format!(".filter: {e}")))?;
+    Ok(design.tuning["flight"]["airspeed_m_s"].as_f64())
+}
+
+/// The same by filter.json of the plant airplane. Errors: another plant, rate or gyro, an axis that is missing,
+/// commands and measurements of another half.
 pub fn airframe_of(setting: &Setting, half: Half, path: &Path) -> Result<HalfFeed, LoopError> {
     let design = FilterDesign::read(path).map_err(|e| LoopError(format!(".filter: {e}")))?;
     let wrong = |message: String| LoopError(format!(".filter: {}: {message}", path.display()));
@@ -473,6 +483,7 @@ pub fn airframe_of(setting: &Setting, half: Half, path: &Path) -> Result<HalfFee
     let letter = ["x", "y", "z"][half.gyros()[0]];
     let axis = design.axes.iter().find(|axis| axis.name.ends_with(letter));
     let axis = axis.ok_or_else(|| wrong(format!("has no axis {letter}, which has the filter of {}", half.title())))?;
+    of_same_gyro(axis, setting, half.gyros()[0]).map_err(&wrong)?;
     let found = [axis.model.inputs.len(), axis.model.measurements.len()];
     let expected = [half.surfaces().len(), half.rates().len() + 1];
     if found != expected || axis.model.states.len() < AIRFRAME {

@@ -16,6 +16,8 @@ use crate::numerics::van_loan::van_loan;
 
 /// Parts of a sample shorter than this are rounding of a whole number of samples.
 const NO_PART: f64 = 1e-6;
+/// Samples of delay: an autopilot that waits for longer controls nothing, and the cost grows with their third power.
+const MOST_DELAY: usize = 100;
 /// States and gusts of each half in the turbulence model u | w1 w2 q | v1 v2 r | p.
 const TURBULENCE: [(usize, [usize; 3]); 2] = [(0, [0, 2, 4]), (4, [1, 3, 5])];
 /// Turbulence states of a half.
@@ -101,6 +103,12 @@ impl Plant {
             .map(|actuator| parts(setting.delay, actuator.map_or(0.0, |actuator| actuator.delay), interval))
             .collect();
         let registers: Vec<usize> = delays.iter().map(|(whole, part)| whole + usize::from(*part > 0.0)).collect();
+        if let Some(late) = registers.iter().find(|late| **late > MOST_DELAY) {
+            return Err(LoopError(format!(
+                "autopilot.delay: found {late} samples from measurement to servo; expected at most {MOST_DELAY}, each \
+                 of which is a state of the loop: lower the delay, or autopilot.rate"
+            )));
+        }
         let all = n + registers.iter().sum::<usize>();
         let mut plant = Plant {
             half,

@@ -172,9 +172,9 @@ fn changes(points: &[Point], unit: &str) -> Vec<String> {
     let change = |pair: &[&Point]| {
         (pair[0].best != pair[1].best).then(|| {
             format!(
-                "between {} and {} {unit}: {} -> {}",
+                "between {} and {}: {} -> {}",
                 digits(pair[0].value),
-                digits(pair[1].value),
+                format!("{} {unit}", digits(pair[1].value)).trim_end(),
                 name(pair[0]),
                 name(pair[1])
             )

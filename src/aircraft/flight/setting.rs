@@ -17,6 +17,8 @@ use crate::aircraft::atmosphere::dryden::Dryden;
 use crate::params::{Measured, Params};
 use crate::units::{Quantity, digits};
 
+/// Gyros of small vehicles give up to 32 kHz; answers in time are followed sample by sample.
+const FASTEST: f64 = 40e3;
 /// Two numbers of samples per second are one if they are so to this part: what decimal numbers leave.
 const SAME_RATE: f64 = 1e-9;
 
@@ -82,6 +84,13 @@ impl Setting {
             .as_ref()
             .ok_or_else(|| error("autopilot", "missing; there is no loop without it: give rate and gains"))?;
         let rate = autopilot.rate.si();
+        if rate > FASTEST {
+            let found = digits(rate);
+            return Err(FlightError(format!(
+                "autopilot.rate: found {found} Hz; expected at most {} Hz: no gyro is read faster",
+                digits(FASTEST)
+            )));
+        }
         let height = request.altitude - document.ground.as_ref().map_or(0.0, Measured::si);
         let (dryden, discrete) = gusts(document, height, request.airspeed, airplane.size.span)?;
         let sensors = &document.sensors;

@@ -5,8 +5,9 @@ use serde_json::{Value, json};
 
 use crate::aircraft::closed_loop::Judged;
 use crate::aircraft::closed_loop::analysis::{FeedResult, HalfResult};
-use crate::aircraft::closed_loop::curves::{Corner, gain, gust_answer};
+use crate::aircraft::closed_loop::curves::{Corner, Drawn, gain, gust_answer};
 use crate::aircraft::closed_loop::feed::Kind;
+use crate::aircraft::closed_loop::flights::Course;
 use crate::report::figure::{self, Curve, Lines, Nyquist, OverLog, TimeLines};
 use crate::report::{Level, Section};
 
@@ -15,14 +16,17 @@ const DISK: f64 = 0.8;
 const HALVES: [&str; 2] = ["Pitch", "Roll and yaw"];
 /// rad/s beyond which a pole is filter or servo and would squeeze those of the airplane.
 const FARTHEST: f64 = 60.0;
+/// s of a flight in which surfaces are drawn: over more of it four feeds are a smear.
+const SURFACE_SHOWN: f64 = 5.0;
 
-pub(super) fn sections<'a>(judged: &'a Judged, corners: &'a [Corner]) -> Vec<Section<'a>> {
+pub(super) fn sections<'a>(judged: &'a Judged, drawn: &'a Drawn) -> Vec<Section<'a>> {
+    let corners = drawn.corners.as_slice();
     let mut out = vec![
         Section::new("Motions")
             .at(Level::Full)
             .figure("Poles of the closed loop in continuous time, those of filters included.", || poles(judged, 0))
             .figure("", || poles(judged, 1))
-            .figure("After a 1 - cos gust: that of the flight, or one of 3 m/s over 25 m.", || gust(judged, 0))
+            .figure("After a 1 - cos gust, exactly: that of the flight, or one of 3 m/s over 25 m.", || gust(judged, 0))
             .figure("", || gust(judged, 1)),
         Section::new("Margins")
             .at(Level::Full)
@@ -35,6 +39,7 @@ pub(super) fn sections<'a>(judged: &'a Judged, corners: &'a [Corner]) -> Vec<Sec
             .figure("", || sensitivity(judged, 1, 0))
             .figure("", || sensitivity(judged, 1, 1)),
     ];
+    out.extend(flight(judged, drawn));
     if !corners.is_empty() {
         let mut section = Section::new("Against a low-pass").at(Level::Full);
         for (half, surface) in [(0, 0), (1, 0), (1, 1)] {
@@ -126,6 +131,58 @@ fn gust(judged: &Judged, half: usize) -> String {
         quantity: judged.raw.halves[half].circuit.half.angle_name().into(),
         unit: "deg".into(),
         lines: lines.collect(),
+        limits: vec![],
+    })
+}
+
+/// All feeds in one flight.
+fn flight<'a>(judged: &'a Judged, drawn: &'a Drawn) -> Option<Section<'a>> {
+    let section = Section::new("A flight in gusts").at(Level::Full);
+    match &drawn.flight {
+        Err(why) => Some(section.paragraph(format!("None is drawn: {why}."))),
+        Ok(courses) if courses.is_empty() => None,
+        Ok(courses) => Some(
+            section
+                .figure(
+                    "In six degrees of freedom, the same gusts and noise for every feed; what the gyros' constant bias \
+                     does is the offset of the tables.",
+                    || angle(judged, courses, 0),
+                )
+                .figure("", || angle(judged, courses, 1))
+                .figure("The last seconds of that flight.", || deflection(judged, courses, 0))
+                .figure("", || deflection(judged, courses, 1)),
+        ),
+    }
+}
+
+fn angle(judged: &Judged, courses: &[Course], half: usize) -> String {
+    let curve = |course: &Course| Curve {
+        label: course.feed.clone(),
+        points: course.samples.iter().map(|(t, angles, _)| (*t, angles[half].to_degrees())).collect(),
+    };
+    figure::time_lines(&TimeLines {
+        title: format!("{}: a flight in gusts", HALVES[half]),
+        quantity: format!("{}, less that of the trim", judged.raw.halves[half].circuit.half.angle_name()),
+        unit: "deg".into(),
+        lines: courses.iter().map(curve).collect(),
+        limits: vec![],
+    })
+}
+
+fn deflection(judged: &Judged, courses: &[Course], half: usize) -> String {
+    let last = |course: &Course| course.samples.last().map_or(0.0, |(t, _, _)| *t);
+    let from = courses.iter().map(last).fold(0.0, f64::max) - SURFACE_SHOWN;
+    let curve = |course: &Course| {
+        let late = course.samples.iter().filter(|(t, _, _)| *t >= from);
+        let points = late.map(|(t, _, surfaces)| (*t, surfaces[half].to_degrees())).collect();
+        Curve { label: course.feed.clone(), points }
+    };
+    let name = surface(&judged.raw.halves[half], 0);
+    figure::time_lines(&TimeLines {
+        title: format!("{}: {name} in that flight", HALVES[half]),
+        quantity: name.into(),
+        unit: "deg".into(),
+        lines: courses.iter().map(curve).collect(),
         limits: vec![],
     })
 }

@@ -1,6 +1,7 @@
 //! Sweeps, spreads and flights of a control loop.
 
 use super::super::answer::three;
+use crate::aircraft::closed_loop::document::LoopDocument;
 use crate::aircraft::closed_loop::flown::{Flown, Paired};
 use crate::aircraft::closed_loop::varied::{FeedPoint, Moved, Optimized, Spread, Sweep};
 use crate::aircraft::flight::RateGains;
@@ -10,6 +11,45 @@ use crate::units::digits;
 
 const SWEEP: [&str; 7] = ["value", "feed", "disk margin", "damping", "surface rates (deg/s)", "angles (deg)", "result"];
 const SPREAD: [&str; 5] = ["feed", "criterion", "kept (%)", "95 % from", "to"];
+
+/// What was asked for beside the verdict, in a sentence each.
+pub(super) fn briefly(document: &LoopDocument) -> Vec<String> {
+    let nobody = || "no feed keeps every criterion".to_string();
+    let sweep = document.sweep.as_ref().map(|sweep| {
+        let throughout = || match sweep.points.iter().find_map(|point| point.best.as_ref()) {
+            Some(best) => format!("{best} is best throughout"),
+            None => nobody(),
+        };
+        let said = if sweep.changes.is_empty() { throughout() } else { sweep.changes.join("; ") };
+        format!("Over the {}: {said}.", sweep.variable)
+    });
+    let spread = document.spread.as_ref().map(|spread| {
+        let all = spread.kept.iter().filter(|kept| kept.criterion == "all criteria");
+        let shares: Vec<String> = all.map(|kept| format!("{} {:.0} %", kept.feed, 100.0 * kept.share)).collect();
+        format!("Of {} drawn airplanes so many keep every criterion: {}.", spread.cases, shares.join(", "))
+    });
+    let optimized = document.optimized.as_ref().map(|found| {
+        let of = |name: &String| found.feeds.iter().find(|feed| feed.feed == *name);
+        match found.best.as_ref().and_then(of).zip(found.gains.as_ref()) {
+            Some((best, gains)) => {
+                let [from, to] = [best.cost.from, best.cost.to].map(three);
+                format!("Optimised, {} costs least: {from} -> {to}, \"gains\": {gains}", best.feed)
+            }
+            None => format!("Optimised, {}.", nobody()),
+        }
+    });
+    let flights = document.flights.as_ref().map(|flown| {
+        let inside = flown.linear.iter().filter(|row| row.inside).count();
+        format!(
+            "{} flights: {inside} of {} exact rms lie in the 95 % intervals of those flown; {} flights know every rms \
+             to 1 %.",
+            flown.runs,
+            flown.linear.len(),
+            flown.needed_for_one_percent
+        )
+    });
+    [sweep, spread, optimized, flights].into_iter().flatten().collect()
+}
 
 pub(super) fn sweep(sweep: &Sweep) -> Section<'_> {
     let caption = format!("Sweep of {}: {}", sweep.variable, sweep.meaning);

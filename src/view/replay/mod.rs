@@ -51,16 +51,19 @@ fn answer<'a>(result: &ReplayResult, unit: Option<&Unit>) -> Section<'a> {
         let now = &axis.final_output;
         let (scale, shown) = in_log_unit(&now.unit, result.quantity, unit);
         let [value, sigma] = [now.value, now.sigma].map(|v| three(v / scale));
+        let name = if axis.of_plant { format!("{} ", now.name) } else { String::new() };
         [
             axis.name.clone(),
             axis.accepted.to_string(),
             axis.nis.as_ref().map_or("-".into(), |nis| three(nis.mean)),
             slow.map_or("-".into(), |slow| format!("{} of predicted", three(slow.ratio))),
-            format!("{value} ± {sigma} {shown}"),
+            format!("{name}{value} ± {sigma} {shown}"),
             answer::result(result.tests.iter().filter(|test| test.axis == axis.name)),
         ]
     };
-    let header = ["", "samples", "NIS", "slow power", "drift at the end", "result"];
+    // what a plant gives first is no drift: an angle, a velocity
+    let end = if result.axes.iter().any(|axis| axis.of_plant) { "at the end" } else { "drift at the end" };
+    let header = ["", "samples", "NIS", "slow power", end, "result"];
     Section::new("").table("", &header, result.axes.iter().map(row))
 }
 

@@ -58,7 +58,8 @@ pub(crate) fn asked<R: DeserializeOwned>(request: &str) -> anyhow::Result<R> {
     serde_json::from_str(request).map_err(|error| {
         let text = error.to_string();
         // the text of a request is nobody's file: its line says nothing
-        anyhow!("{}", text.rsplit_once(" at line ").map_or(text.as_str(), |(said, _)| said))
+        let said = text.rsplit_once(" at line ").map_or(text.as_str(), |(said, _)| said);
+        anyhow!("{}", said.replace("unknown variant", "unknown value"))
     })
 }
 

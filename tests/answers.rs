@@ -89,6 +89,31 @@ fn answers_are_short_and_first() {
     assert!(said.contains("FAIL: "), "{said}");
 }
 
+/// A column that runs like a clock is offered in the place of a rate that would be invented.
+#[test]
+fn a_clock_without_a_name_is_offered() {
+    let bench = Bench::new();
+    let rows: String = (0..200).map(|i| format!("{},{},0.5\n", 1000 + 10 * i, f64::from(i * 7919 % 101))).collect();
+    bench.file("log.csv", format!("first,gyro_x (deg/s),other\n{rows}"));
+    let said = typed(&bench, "allan log.csv").stderr;
+    assert!(said.contains("column 'first' runs like a clock in ms; for example: kfdesign allan log.csv"), "{said}");
+    let command = said.trim_end().split("kfdesign ").last().unwrap();
+    assert_eq!(typed(&bench, command).status, 0, "{command}");
+    assert!(command.ends_with("--time first:ms"), "{command}");
+}
+
+/// What a page begins with is what the terminal shows.
+#[test]
+fn a_page_begins_with_the_answer() {
+    let bench = Bench::new();
+    bench.ok(&format!("simulate {} -o log.npy --duration 10min --seed 4", data("params.json").display()));
+    let said = typed(&bench, "identify log.npy --report page.html").stdout;
+    let page = bench.read("page.html");
+    let head = page.split("</header>").next().unwrap();
+    assert!(said.contains("Angle random walk") && head.contains("Angle random walk"), "{said}");
+    assert!(head.contains("N, deg/s/√Hz") && head.matches("<tr>").count() == 4, "{head}");
+}
+
 /// Three sensors of others, each of which needs other words to be read.
 #[test]
 fn answers_on_measured_logs_are_short_and_first() {
@@ -187,9 +212,8 @@ fn what_a_log_does_not_say_is_asked_for_once() {
     let out = typed(&bench, "identify bare.csv -o params.json");
     assert_eq!((out.status, out.stderr.lines().count()), (2, 1), "{}", out.stderr);
     let (_, example) = out.stderr.trim_end().split_once("for example: kfdesign ").unwrap();
-    assert_eq!(example, "identify bare.csv -o params.json --columns 2,3,4 --unit deg/s --rate 100");
-    let command = example.replace("--rate 100", "--rate 20");
-    assert_eq!(typed(&bench, &command).status, 0);
+    assert_eq!(example, "identify bare.csv -o params.json --columns 2,3,4 --unit deg/s --time 1:s");
+    assert_eq!(typed(&bench, example).status, 0);
     assert_eq!(Params::read(&bench.path("params.json")).unwrap().source.unwrap().reading.unwrap().columns.len(), 3);
     for command in ["tune params.json -o filter.json", "replay filter.json bare.csv", "compare params.json bare.csv"] {
         let out = bench.run(command);

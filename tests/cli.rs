@@ -39,6 +39,42 @@ fn a_usage_error_is_one_line_and_status_2() {
     }
 }
 
+/// No number of the operating system, no jargon of a parser; the name that may be meant, and what to type.
+#[test]
+fn wrong_use_is_told_in_words() {
+    let bench = Bench::new();
+    bench.file("open.json", "{\"format\": ");
+    bench.file("word.json", "{\"format\": nul}");
+    bench.file("log.csv", "gyro_x (deg/s)\n1\n2\n");
+    bench.file("params.json", std::fs::read(data("params.json")).unwrap());
+    let no_file = "cannot read: there is no such file";
+    for (args, said) in [
+        ("tune none.json", no_file),
+        ("replay none.json log.csv", no_file),
+        ("montecarlo none.json", no_file),
+        ("merge none.json", no_file),
+        ("trim none.json", no_file),
+        ("loop none.json", no_file),
+        ("import none.yaml", no_file),
+        ("tune params.json --plant none.json", no_file),
+        ("montecarlo .", "cannot read: it is a folder"),
+        ("identify -", "-: a log is read more than once: save it to a file first"),
+        ("tune open.json", "not valid JSON: the text ends too early: a bracket or a quotation mark is not closed"),
+        ("tune word.json", "not valid JSON: expected a number, a text in quotation marks, true, false, null"),
+        ("log.csv", "it is a file; what is to be done with it? kfdesign info log.csv says what is in it"),
+        ("replay", "usage: kfdesign replay <FILTER> <LOG>; options: kfdesign replay -h; for example: kfdesign replay"),
+        ("export params.json other.json --to px4", "usage: kfdesign export [OPTIONS] --to <TARGET> <FILE>"),
+        ("export params.json --to px5", "a similar value exists: 'px4'"),
+        ("tune params.json --plant agnle", "did you mean 'angle'?"),
+        ("plan params.json --parameter white.densty --precision 1%", "did you mean 'white.density'?"),
+        ("identify log.csv --rate 1 --columns gyro_y", "did you mean 'gyro_x'?"),
+    ] {
+        let out = bench.run(args);
+        let told = out.stderr.lines().count() == 1 && out.stderr.contains(said);
+        assert!(out.status == 2 && told && !out.stderr.contains("os error"), "{args}: {out:?}");
+    }
+}
+
 /// Paragraphs of a help text in one line each, however they were broken.
 fn words(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")

@@ -1,10 +1,10 @@
 //! `kfdesign identify`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::Status;
 use super::files::{self, Kind};
-use super::output::{print_json, print_report, say};
+use super::output::{is_brief, print_json, print_report, say};
 use super::plot::Plot;
 use crate::export::atomic;
 use crate::ops::identify::{Request, run as identify};
@@ -46,7 +46,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     let mut report = view::identify::identify(&done.params, &done.axes, done.shared.as_ref());
     args.plot.write(&format!("{}: overlapping Allan deviation", done.name()), &report)?;
     files::write_page(args.report.as_deref(), &report)?;
-    let status = status(&done.params, args.output.as_deref());
+    let status = status(&done.params, args);
     if args.json {
         print_json(&done.document())?;
     } else {
@@ -60,10 +60,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     Ok(status)
 }
 
-/// A failed check is said on stderr, in one line.
-fn status(params: &Params, output: Option<&Path>) -> Status {
+/// A failed check is said on stderr, in one line, where the answer does not begin with it.
+fn status(params: &Params, args: &Args) -> Status {
     let Some(failed) = params.failed_check() else { return Status::Done };
-    let kept = output.map_or_else(String::new, |path| format!(", kept in {}", path.display()));
-    say(&format!("check failed: {failed} (exit status 1{kept})"));
+    if args.json || !is_brief() {
+        let kept = args.output.as_deref().map_or_else(String::new, |path| format!(", kept in {}", path.display()));
+        say(&format!("check failed: {failed} (exit status 1{kept})"));
+    }
     Status::CheckFailed
 }

@@ -34,6 +34,7 @@ pub mod trim;
 pub mod tune;
 
 use std::ffi::OsString;
+use std::path::Path;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -81,7 +82,8 @@ impl VerdictFlags {
     name = "kfdesign",
     version,
     about,
-    after_help = "Exit status: 0 done and consistent; 1 done, but a stated check failed, or the verdict is \
+    after_help = "Begin with: kfdesign identify LOG -o params.json, kfdesign tune params.json -o filter.json,\n            \
+                  kfdesign replay filter.json LOG; each says which command comes next\nExit status: 0 done and consistent; 1 done, but a stated check failed, or the verdict is \
                   inconclusive (see --allow-inconclusive); 2 could not do it. It is that of the work, whatever becomes \
                   of its output.\nUnits are never guessed: the log's header or --unit says them."
 )]
@@ -136,7 +138,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>, stop: &Stop) -> u8 {
             return 2;
         }
         Err(error) if error.use_stderr() => {
-            say(&format!("kfdesign: {}", usage_error(&error)));
+            say(&format!("kfdesign: {}", usage_error(&error, &args)));
             return 2;
         }
         Err(help) => {
@@ -218,18 +220,43 @@ pub fn in_one_line(error: &anyhow::Error) -> String {
         }
     }
     // also of what a file is called
-    plain(&said.join(": ")).into_owned()
+    without_system(&plain(&said.join(": ")))
 }
 
-/// clap's message as one line: what was found and what is expected, without the usage block.
-fn usage_error(error: &clap::Error) -> String {
+/// Words of the operating system, as those of the program: no number, and what there is in place of what there is
+/// not.
+fn without_system(text: &str) -> String {
+    let mut parts = text.split(" (os error ");
+    let mut out = parts.next().unwrap_or_default().to_string();
+    out.extend(parts.map(|part| part.split_once(')').map_or("", |(_, rest)| rest)));
+    out.replace("No such file or directory", "there is no such file").replace("Is a directory", "it is a folder")
+}
+
+/// clap's message as one line: what was found, and what to do: the name that may be meant, or what to type.
+fn usage_error(error: &clap::Error, args: &[OsString]) -> String {
     let text = error.render().to_string();
-    let mut parts = text.split("\n\n").map(|part| part.split_whitespace().collect::<Vec<_>>().join(" "));
-    let message = parts.next().unwrap_or_default();
-    // "tip: a similar argument exists: '--unit'"
-    let tip = parts.find_map(|part| part.strip_prefix("tip: ").map(String::from));
-    let help = || "kfdesign --help, or kfdesign COMMAND --help, lists what there is".to_string();
-    format!("{} ({})", message.trim_start_matches("error: "), tip.unwrap_or_else(help))
+    let parts = text.split("\n\n").map(|part| part.split_whitespace().collect::<Vec<_>>().join(" "));
+    let parts: Vec<String> = parts.collect();
+    let part = |prefix: &str| parts.iter().find_map(|part| part.strip_prefix(prefix));
+    let message = parts.first().map_or("", |part| part.trim_start_matches("error: "));
+    let command = command();
+    // of those that are typed the first is the command
+    let typed = args.iter().skip(1).find_map(|word| command.find_subcommand(word));
+    let file = args.get(1).filter(|word| typed.is_none() && Path::new(word).exists()).map(|word| word.to_string_lossy());
+    let hint = match (file, part("tip: "), part("Usage: "), typed) {
+        (Some(file), ..) => format!("it is a file; what is to be done with it? kfdesign info {file} says what is in it"),
+        // "a similar argument exists: '--unit'"
+        (None, Some(tip), ..) => tip.to_string(),
+        (None, None, Some(usage), Some(typed)) => {
+            let name = typed.get_name();
+            let help = typed.get_after_help().map(ToString::to_string).unwrap_or_default();
+            let example = help.lines().next().and_then(|line| line.split_once(": ")).map(|(_, example)| example.trim());
+            let example = example.map_or_else(String::new, |example| format!("; for example: {example}"));
+            format!("usage: {usage}; options: kfdesign {name} -h{example}")
+        }
+        _ => "kfdesign --help, or kfdesign COMMAND --help, lists what there is".to_string(),
+    };
+    format!("{message} ({hint})")
 }
 
 /// The command line, whose short help has the options that a person needs first.
@@ -249,7 +276,7 @@ fn command() -> clap::Command {
 /// Options in the short help of a command: of the many there are, those without which little can be done.
 const FIRST: [(&str, &[&str]); 12] = [
     ("allan", &["columns", "unit", "rate", "output", "plot"]),
-    ("identify", &["columns", "unit", "rate", "output", "report"]),
+    ("identify", &["columns", "sensor", "unit", "rate", "output", "report"]),
     ("compare", &["columns", "unit", "rate", "parameters", "report"]),
     ("inflate", &["columns", "unit", "rate", "from", "output"]),
     ("simulate", &["output", "duration", "seed", "rate", "true-rate"]),

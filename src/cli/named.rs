@@ -60,7 +60,8 @@ pub fn asked<R: DeserializeOwned>(request: &str) -> anyhow::Result<R> {
 /// The text of a request is nobody's file: its line says nothing.
 pub fn without_place(error: &serde_json::Error) -> String {
     let text = error.to_string();
-    text.rsplit_once(" at line ").map_or(text.as_str(), |(said, _)| said).to_string()
+    let said = text.rsplit_once(" at line ").map_or(text.as_str(), |(said, _)| said);
+    said.replace("unknown variant", "unknown value")
 }
 
 fn pretty(document: &impl Serialize) -> anyhow::Result<String> {

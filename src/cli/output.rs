@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{ErrorKind, IsTerminal, Write};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use anstream::stream::RawStream;
@@ -19,6 +20,10 @@ use crate::report::{Report, terminal};
 
 /// Characters in a line where nobody says how wide the terminal is, and at most: what a person reads at a glance.
 const WIDTH: usize = 80;
+
+/// Warnings before an answer that is to be seen at a glance: those of a log are of each axis, and the answer counts
+/// them.
+const MOST_WARNINGS: usize = 3;
 
 /// How much a person wants to see.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -101,6 +106,11 @@ fn detail() -> Detail {
     *DETAIL.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// A person sees the answer and no more.
+pub fn is_brief() -> bool {
+    detail() == Detail::Brief
+}
+
 /// A report for a person: the answer, or every table, as wide as the terminal, and with whole lines where stdout is
 /// none. `status`: of the work.
 pub fn print_report(report: &Report<'_>, status: Status) {
@@ -180,6 +190,7 @@ pub fn exit_status(work: u8) -> u8 {
 #[derive(Default)]
 struct Terminal {
     bar: Mutex<Option<ProgressBar>>,
+    warnings: AtomicUsize,
 }
 
 impl Terminal {
@@ -220,7 +231,13 @@ impl Progress for Terminal {
     }
 
     fn warning(&self, line: &str) {
-        if detail() != Detail::Quiet {
+        let before = self.warnings.fetch_add(1, Ordering::Relaxed);
+        let most = match detail() {
+            Detail::Quiet => 0,
+            Detail::Brief => MOST_WARNINGS,
+            Detail::Full => usize::MAX,
+        };
+        if before < most {
             self.end();
             warn(line);
         }
@@ -233,6 +250,10 @@ pub fn watched<T: Send>(command: impl FnOnce() -> T + Send) -> Result<T, Stopped
     let watch: Arc<dyn Progress> = Arc::clone(&terminal) as _;
     let done = progress::watched(&watch, command);
     terminal.end();
+    let more = terminal.warnings.load(Ordering::Relaxed).saturating_sub(MOST_WARNINGS);
+    if more > 0 && is_brief() {
+        say(&format!("  ({more} more warning{} with -v)", if more == 1 { "" } else { "s" }));
+    }
     done
 }
 

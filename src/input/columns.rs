@@ -1,6 +1,7 @@
 //! The columns to read: axes, their units, and the time. What stays ambiguous is an error that lists what is there.
 
 use super::names::{Head, axis_at, is_excluded, sensor_of, time_rank, words};
+use crate::params::place::meant;
 use crate::units::{Dimension, Quantity, Unit};
 
 use super::{AxisInfo, ExtraColumn, InputError, InputKind, LogOptions};
@@ -159,7 +160,10 @@ impl Table<'_> {
         }
         match wanted.parse::<usize>() {
             Ok(number) if (1..=self.heads.len()).contains(&number) => Ok(number - 1),
-            _ => self.fail(format!("no column '{wanted}'; {}", self.there_are())),
+            _ => {
+                let names = self.heads.iter().filter(|_| self.named).map(|head| &*head.name);
+                self.fail(format!("no column '{wanted}'; {}{}", meant(wanted, names), self.there_are()))
+            }
         }
     }
 

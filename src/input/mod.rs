@@ -4,6 +4,7 @@
 mod account;
 mod arrays;
 mod bytes;
+mod clock;
 mod columns;
 mod dataflash;
 mod hdf5;
@@ -208,7 +209,8 @@ impl Log {
         let (mut table, note) = source::choose(path, source::open(path)?, options)?;
         let (named, place, rate) = (table.named(), table.place(), table.rate());
         let rate_hz = rate.as_ref().map(|(_, rate)| *rate);
-        let choice = columns::Table { heads: &table.heads(), named, place: &place, rate_hz }.choose(options)?;
+        let choice = columns::Table { heads: &table.heads(), named, place: &place, rate_hz }.choose(options);
+        let choice = choice.map_err(|error| clock::offer(error, &mut *table))?;
         let mut notes: Vec<Finding> = note.map(|note| Finding::note(FindingKind::Topic, note)).into_iter().collect();
         let mut options = options.clone();
         if choice.time.is_none()

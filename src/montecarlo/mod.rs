@@ -78,7 +78,10 @@ pub enum MonteCarloError {
     Parameters { source: TuneError },
     #[error("axis '{axis}': the truth has {truth}, the filter {filter}")]
     Mismatch { axis: String, truth: String, filter: String },
-    #[error("the truth has the axes {truth}, the filter {filter}; expected the same names")]
+    #[error(
+        "the truth has the axes {truth}, the filter {filter}; expected the same names: tune a filter for the axes of \
+         the truth"
+    )]
     Axes { truth: String, filter: String },
     #[error("the truth is {truth}, the filter {filter}")]
     Quantity { truth: &'static str, filter: &'static str },

@@ -11,7 +11,7 @@ use super::checked;
 use crate::identify::log_plan::{LogPlan, log_plan};
 use crate::identify::plan::Planned;
 use crate::numerics::progress::note;
-use crate::params::{AxisParams, Params};
+use crate::params::{AxisParams, Params, place};
 use crate::view;
 
 /// What to plan for.
@@ -89,8 +89,9 @@ fn chosen<'a>(request: &Request, params: &'a Params) -> anyhow::Result<Vec<&'a A
         }
     }
     if found.is_empty() {
+        let meant = place::meant(&request.parameter, known.iter().map(String::as_str));
         let known = if known.is_empty() { "no noise parameter at all".to_string() } else { known.join(", ") };
-        bail!("`parameter` {}: {file} has no such parameter; it has {known}", request.parameter);
+        bail!("`parameter` {}: {file} has no such parameter; {meant}it has {known}", request.parameter);
     }
     Ok(found)
 }

@@ -200,7 +200,8 @@ impl AidEntry {
 
 /// `unknown plant 'x'`, with the known ones.
 pub fn unknown_plant(found: &str) -> String {
-    format!("unknown plant '{found}'; known plants: {}", PLANTS.join(", "))
+    let meant = place::meant(found, PLANTS.iter().copied());
+    format!("unknown plant '{found}'; {meant}known plants: {}", PLANTS.join(", "))
 }
 
 impl Design {

@@ -66,10 +66,28 @@ pub fn file(path: &Path) -> Result<(String, String), DocumentError> {
 pub fn parse(text: &str) -> Result<Value, SyntaxError> {
     let text = text.trim_start_matches('\u{feff}');
     serde_json::from_str::<Strict>(text).map(|strict| strict.0).map_err(|error| {
-        let message = error.to_string();
-        let message = message.split(" at line ").next().unwrap_or_default().to_string();
-        SyntaxError { line: error.line(), column: error.column(), message }
+        SyntaxError { line: error.line(), column: error.column(), message: in_words(&error) }
     })
+}
+
+/// What the parser says, without its place and its own jargon.
+fn in_words(error: &serde_json::Error) -> String {
+    let said = error.to_string();
+    match said.split(" at line ").next().unwrap_or_default() {
+        _ if error.is_eof() => "the text ends too early: a bracket or a quotation mark is not closed".into(),
+        "expected ident" | "expected value" => {
+            "expected a number, a text in quotation marks, true, false, null, a list or an object".into()
+        }
+        "trailing characters" => "something follows the end of the document".into(),
+        "key must be a string" => "a key stands in quotation marks".into(),
+        other => other.to_string(),
+    }
+}
+
+/// `did you mean 'x'? `, where a known name is near the one that was found; else nothing.
+pub fn meant<'k>(found: &str, known: impl IntoIterator<Item = &'k str>) -> String {
+    let known: Vec<&str> = known.into_iter().collect();
+    nearest(found, &known).map(|name| format!("did you mean '{name}'? ")).unwrap_or_default()
 }
 
 /// A value and where it stands.
@@ -115,7 +133,7 @@ impl<'a> Place<'a> {
         };
         let object = Object { key: self.key.clone(), map };
         if let Some(unknown) = map.keys().find(|k| !known.contains(&k.as_str())) {
-            let meant = nearest(unknown, known).map(|n| format!("did you mean '{n}'? ")).unwrap_or_default();
+            let meant = meant(unknown, known.iter().copied());
             let message = format!("unknown key; {meant}known here: {}", known.join(", "));
             return Err(KeyError { key: object.path(unknown), message });
         }

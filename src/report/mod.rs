@@ -32,7 +32,6 @@ pub struct Report<'a> {
     pub subtitle: String,
     pub verdict: Option<Conclusion>,
     /// What a person acts on, in a few lines; its heading says what this is about.
-    #[serde(skip)]
     pub answer: Section<'a>,
     /// Label and value: log, samples, method, version, seed.
     pub provenance: Vec<(String, String)>,

@@ -88,7 +88,7 @@ BAD = [
     (dict(x=X[None]), "an array of 3 dimensions; expected samples in rows"),
     (dict(names=["x", "y"]), "2 names for 3 columns"),
     (dict(names=["x", "y", "y"]), "two columns have the same name"),
-    (dict(sensor="compass"), "unknown variant `compass`"),
+    (dict(sensor="compass"), "unknown value `compass`"),
 ]
 
 
@@ -110,6 +110,12 @@ def test_a_missing_file_and_a_name_that_no_document_can_have(tmp_path: Path) -> 
         kf.read_log(os.fsdecode(name))
     with pytest.raises(TypeError, match="read_log\\(\\) has no keyword 'colums'; did you mean 'columns'\\?"):
         kf.read_log("x.csv", colums=["x"])  # type: ignore[call-arg]
+    with pytest.raises(TypeError, match="read_log\\(FILE, unit=...\\) takes it and gives a log for identify\\(\\)"):
+        kf.identify("log.csv", unit="deg/s")  # type: ignore[call-arg]
+
+
+def test_an_end_that_the_log_does_not_tell_is_shown() -> None:
+    assert repr(kf.Measured(1.5, "s", (1.25, None))) == "1.5 s [1.25 … -]"
 
 
 def test_serious_findings_are_warnings() -> None:

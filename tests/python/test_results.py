@@ -163,7 +163,7 @@ def test_params_of_others(files: Path, tmp_path: Path) -> None:
             kf.KfdesignError,
             "/proc/x.html",
         ),
-        (lambda f: kf.export(f / "params.json", to="nobody"), kf.KfdesignError, "unknown variant `nobody`"),
+        (lambda f: kf.export(f / "params.json", to="nobody"), kf.KfdesignError, "unknown value `nobody`"),
         (lambda f: kf.set_threads(0), kf.KfdesignError, "expected 1 to 1024"),
         (lambda f: kf.identify([]), kf.LogError, "there is no log"),
     ],

@@ -3,7 +3,7 @@
 
 use super::page::Page;
 use super::walk::Field;
-use super::{Export, exponent, walk_unit};
+use super::{ACCELEROMETER, Export, exponent, walk_unit};
 use crate::units::Quantity;
 
 pub(super) fn write(export: &Export, page: &mut Page) -> Result<(), String> {
@@ -21,7 +21,7 @@ pub(super) fn write(export: &Export, page: &mut Page) -> Result<(), String> {
 pub(super) fn four(export: &Export, indent: &str, page: &mut Page) -> Result<(), String> {
     for (quantity, name, flag) in [
         (Quantity::AngularRate, "gyroscope", "the parameters of a gyro"),
-        (Quantity::SpecificForce, "accelerometer", "`accelerometer` PARAMS"),
+        (Quantity::SpecificForce, "accelerometer", ACCELEROMETER),
     ] {
         let unit = quantity.si_unit();
         let Some(white) = export.white(quantity)? else {

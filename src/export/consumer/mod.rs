@@ -219,11 +219,14 @@ fn clamped(name: &str, value: f64, low: f64, high: f64, warnings: &mut Vec<Strin
     inside
 }
 
+/// How the parameters of the second sensor come here.
+const ACCELEROMETER: &str = "`accelerometer` PARAMS, which identify makes of a log with `sensor` accelerometer";
+
 /// What is said of a sensor that is not there.
 fn lacking(quantity: Quantity) -> String {
     match quantity {
         Quantity::AngularRate => "the gyro is missing: give its parameters".into(),
-        Quantity::SpecificForce => "the accelerometer is missing: give `accelerometer` PARAMS".into(),
+        Quantity::SpecificForce => format!("the accelerometer is missing: give {ACCELEROMETER}"),
     }
 }
 

@@ -3,7 +3,7 @@
 
 use super::page::Page;
 use super::walk::Field;
-use super::{Export, clamped, missing, plain};
+use super::{ACCELEROMETER, Export, clamped, missing, plain};
 use crate::units::Quantity;
 
 pub(super) fn write(export: &Export, page: &mut Page) -> Result<(), String> {
@@ -32,8 +32,7 @@ pub(super) fn write(export: &Export, page: &mut Page) -> Result<(), String> {
         }
     }
     if export.accelerometer.is_none() {
-        page.warnings
-            .push(missing("no accelerometer: only the gyro's parameters are written", "`accelerometer` PARAMS"));
+        page.warnings.push(missing("no accelerometer: only the gyro's parameters are written", ACCELEROMETER));
     }
     Ok(())
 }

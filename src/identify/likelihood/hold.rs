@@ -15,6 +15,7 @@ use super::{Candidates, Fitted, IdentifyError, refine};
 use crate::filter::likelihood::Stretch;
 use crate::noise::{Kind, Role};
 use crate::numerics::distribution::chi_square_sf;
+use crate::params::place::meant;
 use crate::units::{Unit, digits};
 
 /// Steps from the free maximum to the held values. A correlation time is searched between two samples and ten lengths
@@ -77,8 +78,9 @@ impl Candidates {
             let Some((_, index, unit)) = found.iter().find(|(parameter, ..)| *parameter == hold.parameter) else {
                 let known: Vec<&str> = found.iter().map(|(parameter, ..)| parameter.as_str()).collect();
                 let model = free.fit.form.label();
+                let meant = meant(&hold.parameter, known.iter().copied());
                 let known = known.join(", ");
-                return Err(failed(format!("the model {model} has no such parameter; it has {known}")));
+                return Err(failed(format!("the model {model} has no such parameter; {meant}it has {known}")));
             };
             hold.unit.require(unit.dimension()).map_err(|error| failed(error.to_string()))?;
             let value = hold.unit.to_si(hold.value);

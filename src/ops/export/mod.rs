@@ -79,7 +79,9 @@ pub enum Consumer {
     Vins,
     Orbslam3,
     Gtsam,
+    #[value(alias = "ekf2")]
     Px4,
+    #[value(alias = "ekf3")]
     Ardupilot,
     Matlab,
     GnssInsSim,

@@ -29,6 +29,9 @@ StrPath = str | os.PathLike[str]
 #: False: silent. True: a bar. A function hears ``(stage, done, parts)``; what it raises ends the work.
 Progress = bool | Callable[[str, int, int], object]
 
+#: How a log is read: keywords of read_log.
+READING = ("topic", "columns", "sensor", "unit", "rate", "time", "start", "end", "input")
+
 _threads: int | None = None
 
 
@@ -62,6 +65,8 @@ def suggesting(function: Callable[P, R]) -> Callable[P, R]:
             if name not in parameters:
                 close = get_close_matches(name, known, 1)
                 hint = f"did you mean '{close[0]}'?" if close else f"expected {', '.join(known)}"
+                if name in READING:
+                    hint = f"read_log(FILE, {name}=...) takes it and gives a log for {function.__name__}()"
                 raise TypeError(f"{function.__name__}() has no keyword '{name}'; {hint}")
         return function(*args, **kwargs)
 

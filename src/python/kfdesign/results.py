@@ -302,7 +302,7 @@ class IdentifiedAxis:
         values = self._values()
         return {name: values[name].value * own[name] / 100.0 for name in values if own.get(name) is not None}
 
-    def conf_int(self, alpha: float = 0.05) -> dict[str, tuple[float, float]]:
+    def conf_int(self, alpha: float = 0.05) -> dict[str, tuple[float | None, float | None]]:
         """95 % intervals of the profile or of the bound.
 
         Parameters

@@ -23,7 +23,8 @@ class Measured:
 
     value: float
     unit: str
-    interval: tuple[float, float] | None = None
+    #: An end that the log does not tell is None.
+    interval: tuple[float | None, float | None] | None = None
 
     @property
     def si(self) -> float:
@@ -34,7 +35,8 @@ class Measured:
         return self.value
 
     def __repr__(self) -> str:
-        inside = "" if self.interval is None else f" [{self.interval[0]:.4g} … {self.interval[1]:.4g}]"
+        ends = ["-" if end is None else f"{end:.4g}" for end in self.interval or ()]
+        inside = f" [{' … '.join(ends)}]" if ends else ""
         return f"{self.value:.4g} {self.unit}{inside}"
 
     @staticmethod

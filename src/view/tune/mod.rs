@@ -93,8 +93,8 @@ pub fn tune<'a>(of: &Design<'a>) -> Report<'a> {
     let (params, outcome) = (of.params, of.verification);
     let groups = groups(of);
     let mut sections: Vec<Section<'a>> = of.record.iter().map(|record| objective::section(record, params)).collect();
-    let headline =
-        format!("{}: plant {}, {} Hz, {}", of.name, of.tuned.design.plant, params.sample_rate_hz, measured(of));
+    let rate = digits(params.sample_rate_hz);
+    let headline = format!("{}: plant {}, {rate} Hz, {}", of.name, of.tuned.design.plant, measured(of));
     sections.push(Section::new("").paragraph(headline));
     sections.extend(groups.iter().map(group_section));
     sections.extend(groups.iter().filter_map(|group| {
@@ -108,7 +108,7 @@ pub fn tune<'a>(of: &Design<'a>) -> Report<'a> {
     let lines = [
         ("parameters", of.name.to_string()),
         ("plant", of.tuned.design.plant.clone()),
-        ("sample rate", format!("{} Hz", params.sample_rate_hz)),
+        ("sample rate", format!("{} Hz", digits(params.sample_rate_hz))),
         ("seed", outcome.seed.to_string()),
     ];
     Report {
@@ -305,7 +305,7 @@ fn verification_sentence(outcome: &Outcome, sample_rate_hz: f64) -> String {
     let what = format!(
         "{} runs of {} s on the design's own model (seed {}), {} tests, false alarm {} %",
         outcome.runs.count(),
-        outcome.steps as f64 / sample_rate_hz,
+        digits(outcome.steps as f64 / sample_rate_hz),
         outcome.seed,
         outcome.tests.len(),
         100.0 * outcome.alpha

@@ -14,7 +14,7 @@ from . import _native
 from ._call import Call, Kept, Progress, StrPath, existing, number_of, suggesting, text_of, texts, writable
 from .design import Design
 from .errors import KfdesignError, LogError, LogWarning
-from .log import Log, read_log
+from .log import Log
 from .params import Params
 from .results import (
     Allan,
@@ -44,7 +44,11 @@ Texts = Sequence[str] | Mapping[str, object] | str | None
 
 
 def _log(log: LogLike) -> Log:
-    return log if isinstance(log, Log) else read_log(log)
+    if isinstance(log, Log):
+        return log
+    # the work reads it, and need not find it read once more
+    path = existing(log)
+    return Log(path, {}, {}, os.path.basename(path))
 
 
 def _logs(logs: LogLike | Sequence[LogLike]) -> list[Log]:

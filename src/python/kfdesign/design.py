@@ -14,6 +14,7 @@ import numpy.typing as npt
 from . import _native
 from ._call import Call, Source, StrPath, writable
 from .errors import DesignError
+from .log import si_unit
 from .params import place_of
 from .results import Result
 from .table import Budget, Measured, Table
@@ -254,7 +255,7 @@ class Design(Result):
         ax : matplotlib.axes.Axes
             Where; None: a new figure.
         label : str
-            Before the names of the axes.
+            One entry of the legend for the whole design; None: one for every axis.
 
         Returns
         -------
@@ -262,7 +263,7 @@ class Design(Result):
         """
         from . import plot
 
-        return plot.sigma(self._reports(), until, ax, label)
+        return plot.sigma(self._reports(), si_unit(self.filter["quantity"]), until, ax, label)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         return self.plot_sigma(ax=ax)

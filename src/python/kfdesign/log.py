@@ -64,14 +64,6 @@ class Log:
 
     Attributes
     ----------
-    axes : tuple of str
-        Names of the axes.
-    unit : str
-        Unit of the axes as the log has it.
-    rate : float
-        Sample rate, Hz.
-    check : Check
-        What is unusual about the log.
     name : str
         What messages call it.
     path : str or None
@@ -92,16 +84,49 @@ class Log:
         self._columns = dict(columns)
         self._reading = {key: value for key, value in reading.items() if value is not None}
         self._whole = whole
+        self._notes = notes
+
+    @cached_property
+    def _head(self) -> dict[str, Any]:
         with Call() as call:
-            found, _, _ = call.read(call.log(self), self._reading, data=False)
-        self.axes: tuple[str, ...] = tuple(axis for axis, _ in found["axes"])
-        self.unit: str = found["axes"][0][1]
-        self.quantity: str = found["quantity"]
-        self.sha256: str = found["sha256"]
-        check = found["check"]
-        self.rate: float = check["sample_rate_hz"]
-        said = tuple(Finding(one["kind"], one["message"], one["serious"], one.get("axis")) for one in check["findings"])
-        self.check = Check(check["samples"], self.rate, check["span_s"], said, notes)
+            return call.read(call.log(self), self._reading, data=False)[0]
+
+    def _opened(self) -> Log:
+        """This log, of which is known that it can be read."""
+        self._head  # noqa: B018
+        return self
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the axes."""
+        return tuple(axis for axis, _ in self._head["axes"])
+
+    @property
+    def unit(self) -> str:
+        """Unit of the axes as the log has it."""
+        return str(self._head["axes"][0][1])
+
+    @property
+    def quantity(self) -> str:
+        """What the sensor measures."""
+        return str(self._head["quantity"])
+
+    @property
+    def sha256(self) -> str:
+        """Of the file; of an array, of its numbers."""
+        return str(self._head["sha256"])
+
+    @property
+    def rate(self) -> float:
+        """Sample rate, Hz."""
+        return self.check.sample_rate_hz
+
+    @property
+    def check(self) -> Check:
+        """What is unusual about the log."""
+        found = self._head["check"]
+        said = tuple(Finding(one["kind"], one["message"], one["serious"], one.get("axis")) for one in found["findings"])
+        return Check(found["samples"], found["sample_rate_hz"], found["span_s"], said, self._notes)
 
     def _lent(self) -> tuple[list[str], int, int, Any]:
         """As the native module reads it: names, number of columns and rows, and what hands over rows as bytes."""
@@ -145,7 +170,7 @@ class Log:
             return Info(call.run("info", {"log": call.log(self)}))
 
     def _columns_si(self) -> dict[str, Floats]:
-        unit = "rad/s" if self.quantity == "angular-rate" else "m/s^2"
+        unit = si_unit(self.quantity)
         names = {f"{name} ({unit})": self.data[:, axis] for axis, name in enumerate(self.axes)}
         return {"time (s)": self.time, **names}
 
@@ -251,7 +276,7 @@ class Log:
             "time": None if time is None else "time (s)",
         }
         is_si = unit is not None and input in (None, "rate") and _is_one(unit) and bool(np.isfinite(whole).all())
-        return Log(None, columns, reading, name, tuple(notes), whole if is_si else None)
+        return Log(None, columns, reading, name, tuple(notes), whole if is_si else None)._opened()
 
     @staticmethod
     def from_frame(
@@ -326,7 +351,7 @@ class Log:
             "sensor": sensor,
             "input": input,
         }
-        return Log(None, given, reading, name, tuple(notes))
+        return Log(None, given, reading, name, tuple(notes))._opened()
 
 
 #: Under which the index of a table of pandas is handed over.
@@ -402,7 +427,12 @@ def read_log(
         "input": input,
     }
     found = existing(path)
-    return Log(found, {}, reading, os.path.basename(found))
+    return Log(found, {}, reading, os.path.basename(found))._opened()
+
+
+def si_unit(quantity: str) -> str:
+    """Of what a sensor measures."""
+    return "rad/s" if quantity == "angular-rate" else "m/s^2"
 
 
 def _is_one(unit: str) -> bool:

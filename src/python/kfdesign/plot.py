@@ -66,7 +66,9 @@ def comparison(axes: Sequence[Mapping[str, Any]], ax: Axes | None) -> Axes:
     return _legend(ax)
 
 
-def sigma(reports: Sequence[Mapping[str, Any]], until: str | float | None, ax: Axes | None, label: str | None) -> Axes:
+def sigma(
+    reports: Sequence[Mapping[str, Any]], unit: str, until: str | float | None, ax: Axes | None, label: str | None
+) -> Axes:
     """Predicted sigma of the drift; axes that are alike are one line."""
     ax = _axes(ax)
     end = number_of(until, "s", "until")
@@ -82,7 +84,7 @@ def sigma(reports: Sequence[Mapping[str, Any]], until: str | float | None, ax: A
         (line,) = ax.loglog(time[inside], total[inside], label=shown, color=colour if label is not None else None)
         colour = line.get_color()
     ax.set_xlabel("time, s")
-    ax.set_ylabel("predicted 1 sigma of the drift, SI")
+    ax.set_ylabel(f"predicted 1 sigma of the drift, {unit}")
     return _legend(ax)
 
 
@@ -127,16 +129,16 @@ def estimates(columns: Mapping[str, Floats], axes: Sequence[str], ax: Axes | Non
         raise KfdesignError("the replay has no estimates: ask for them with estimates=True")
     time = columns["time (s)"]
     step = max(len(time) // _POINTS, 1)
-    unit = state = ""
+    unit, states = "", dict[str, None]()
     for axis in axes:
         sigmas = [name for name in columns if name.startswith(f"{axis}_") and name.split(" (")[0].endswith("_sigma")]
         if not sigmas:
             continue
         name = sigmas[-1].replace("_sigma (", " (")
-        state = name.split(" (")[0].removeprefix(f"{axis}_")
+        states[name.split(" (")[0].removeprefix(f"{axis}_")] = None
         unit = name.rsplit(" (", 1)[-1].rstrip(")")
         values, sigma_of = columns[name][::step], columns[sigmas[-1]][::step]
-        (line,) = ax.plot(time[::step], values, label=name.split(" (")[0], linewidth=1.0)
+        (line,) = ax.plot(time[::step], values, label=axis, linewidth=1.0)
         ax.fill_between(
             time[::step],
             values - 2.0 * sigma_of,
@@ -146,7 +148,7 @@ def estimates(columns: Mapping[str, Floats], axes: Sequence[str], ax: Axes | Non
             linewidth=0,
         )
     ax.set_xlabel("time, s")
-    ax.set_ylabel(f"{state} ± 2 sigma, {unit}")
+    ax.set_ylabel(f"{', '.join(states)} ± 2 sigma, {unit}")
     return _legend(ax)
 
 

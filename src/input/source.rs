@@ -51,7 +51,9 @@ pub(super) fn resolve(path: &Path) -> Result<PathBuf, InputError> {
     }
     match std::fs::metadata(path) {
         // not what comes down a pipe
-        Err(_) if path == Path::new("-") => return fail("a log is read more than once: save it to a file first".into()),
+        Err(_) if path == Path::new("-") => {
+            return fail("a log is read more than once: save it to a file first".into());
+        }
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return fail("there is no such file".into()),
         Err(error) => return fail(format!("cannot read: {error}")),
         Ok(found) if found.is_file() => return Ok(path.to_path_buf()),

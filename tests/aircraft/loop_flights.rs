@@ -118,13 +118,12 @@ fn answers_are_those_of_the_nonlinear_airplane() {
     let plan = Plan::new(&read(&document), Path::new("."), &times).unwrap();
     for (feed, course) in peaks.iter().zip(one(&exact, &plan, 1)) {
         let trim = course.samples[0].2;
-        let largest = |of: &dyn Fn(&(f64, [f64; 2], [f64; 2])) -> f64| {
-            course.samples.iter().map(|s| of(s).abs()).fold(0.0, f64::max).to_degrees()
-        };
+        let largest = |all: &mut dyn Iterator<Item = f64>| all.fold(0.0_f64, |most, x| most.max(x.abs())).to_degrees();
         for (half, peaks, names) in
             [(0, &feed.pitch.gust_peaks, ["theta", "elevator"]), (1, &feed.roll_yaw.gust_peaks, ["phi", "aileron"])]
         {
-            let flown = [largest(&|s| s.1[half]), largest(&|s| s.2[half] - trim[half])];
+            let angle = largest(&mut course.samples.iter().map(|s| s.1[half]));
+            let flown = [angle, largest(&mut course.samples.iter().map(|s| s.2[half] - trim[half]))];
             for (name, flown) in names.iter().zip(flown) {
                 assert!((peaks[*name] / flown - 1.0).abs() < 0.03, "{} {name}: {} {flown}", feed.name, peaks[*name]);
             }

@@ -250,17 +250,11 @@ fn sweeps_say_where_the_best_filter_changes() {
     // the louder the gyro, the less the raw one is worth
     let mut limits = document(TIGHT);
     limits["criteria"] = json!({ "damping": { "at_least": 0.4 } });
-    limits["uncertainty"] = json!({ "aerodynamics": "10 %" });
     bench.file("noise.json", limits.to_string());
     let found: Value = serde_json::from_str(&bench.run("loop noise.json --sweep noise --json").stdout).unwrap();
     let best = |i: usize| found["sweep"]["points"][i]["best"].as_str().unwrap().to_string();
     assert!(best(0) != "airframe KF" && best(6) == "airframe KF", "{} {}", best(0), best(6));
     assert!(!found["sweep"]["changes"].as_array().unwrap().is_empty());
-    // the short answer says what was asked for
-    let out = bench.run("loop noise.json --sweep noise --spread 4 --montecarlo 2 --duration 20s");
-    for part in ["Over the noise: between ", "Of 4 drawn airplanes", "2 flights: "] {
-        assert!(out.stdout.contains(part), "{out:?}");
-    }
 }
 
 #[test]

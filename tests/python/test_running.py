@@ -125,7 +125,7 @@ def test_what_a_listener_raises_comes_out(design: kf.Design) -> None:
         raise Enough(stage)
 
     with pytest.raises(Enough):
-        kf.montecarlo(design, runs=10**6, progress=raises)
+        kf.montecarlo(design, runs=10**12, progress=raises)
 
     def interrupts(stage: str, done: int, parts: int) -> None:
         signal.raise_signal(signal.SIGINT)

@@ -218,7 +218,7 @@ def plan(
     --------
     >>> import kfdesign as kf
     >>> kf.plan("data/params.json", parameter="gauss_markov.correlation_time", precision="10%").duration
-    1.178e+05 s
+    5.861e+04 s
     """
     with Call() as call:
         request = {"parameter": parameter, "precision": _share(precision), "axis": axis, "rate": rate}
@@ -797,7 +797,7 @@ def export(
     --------
     >>> import kfdesign as kf
     >>> print(kf.export("data/params.json", to="kalibr", rate=200).splitlines()[0])
-    # IMU noise for Kalibr (imu.yaml).
+    # kfdesign 0.1.0 export
     """
     with Call() as call:
         code = {key: value for key, value in (("precision", precision), ("form", form)) if value is not None}

@@ -86,10 +86,15 @@ class Log:
         self._whole = whole
         self._notes = notes
 
-    @cached_property
+        self._read: dict[str, Any] | None = None
+
+    # no cached_property: a warning belongs to the line that called this package, with no other code between
+    @property
     def _head(self) -> dict[str, Any]:
-        with Call() as call:
-            return call.read(call.log(self), self._reading, data=False)[0]
+        if self._read is None:
+            with Call() as call:
+                self._read = call.read(call.log(self), self._reading, data=False)[0]
+        return self._read
 
     def _opened(self) -> Log:
         """This log, of which is known that it can be read."""
@@ -481,7 +486,7 @@ def _stamps(time: Any, name: str, notes: list[str]) -> Floats:
 def _columns(frame: Any, name: str) -> list[tuple[str, Any]]:
     """Names and values of the columns, whosever table it is."""
     if hasattr(frame, "iloc") and hasattr(frame, "index"):
-        found = [(str(own), frame.iloc[:, at]) for at, own in enumerate(frame.columns)]
+        found = [(str(own), _plain(frame.iloc[:, at])) for at, own in enumerate(frame.columns)]
         if type(frame.index).__name__ == "DatetimeIndex":
             found.insert(0, (_INDEX, frame.index))
         return found
@@ -506,6 +511,12 @@ def _columns(frame: Any, name: str) -> list[tuple[str, Any]]:
             return _columns(pyarrow.table(frame), name)
         raise LogError(f"{name}: an Arrow stream needs polars or pyarrow to be read")
     raise LogError(f"{name}: expected a table of pandas, polars or pyarrow, found {type(frame).__name__}")
+
+
+def _plain(values: Any) -> Any:
+    """A column of pandas; where numbers have a missing value of pandas' own, NumPy would see objects."""
+    own = not isinstance(values.dtype, np.dtype) and getattr(values.dtype, "kind", None) in ("i", "u", "f")
+    return values.to_numpy(float, na_value=np.nan) if own else values
 
 
 def _is_array(values: Any) -> bool:

@@ -241,9 +241,12 @@ fn usage_error(error: &clap::Error, args: &[OsString]) -> String {
     let command = command();
     // of those that are typed the first is the command
     let typed = args.iter().skip(1).find_map(|word| command.find_subcommand(word));
-    let file = args.get(1).filter(|word| typed.is_none() && Path::new(word).exists()).map(|word| word.to_string_lossy());
+    let file =
+        args.get(1).filter(|word| typed.is_none() && Path::new(word).exists()).map(|word| word.to_string_lossy());
     let hint = match (file, part("tip: "), part("Usage: "), typed) {
-        (Some(file), ..) => format!("it is a file; what is to be done with it? kfdesign info {file} says what is in it"),
+        (Some(file), ..) => {
+            format!("it is a file; what is to be done with it? kfdesign info {file} says what is in it")
+        }
         // "a similar argument exists: '--unit'"
         (None, Some(tip), ..) => tip.to_string(),
         (None, None, Some(usage), Some(typed)) => {

@@ -65,8 +65,10 @@ pub fn file(path: &Path) -> Result<(String, String), DocumentError> {
 /// Parse JSON in which no object has a key twice. Its keys and texts are [`plain`] from here on.
 pub fn parse(text: &str) -> Result<Value, SyntaxError> {
     let text = text.trim_start_matches('\u{feff}');
-    serde_json::from_str::<Strict>(text).map(|strict| strict.0).map_err(|error| {
-        SyntaxError { line: error.line(), column: error.column(), message: in_words(&error) }
+    serde_json::from_str::<Strict>(text).map(|strict| strict.0).map_err(|error| SyntaxError {
+        line: error.line(),
+        column: error.column(),
+        message: in_words(&error),
     })
 }
 

@@ -4,12 +4,8 @@ use super::InputError;
 use super::rows::Rows;
 use super::table::Table;
 
-/// Fewer rows say little of how a column runs.
-const FEWEST: usize = 10;
-/// Of its usual step: a clock of a log may jitter and lose samples, but it neither stands still nor goes back.
-const STEPS: [f64; 2] = [0.1, 10.0];
-/// Share of the steps that may be larger: where samples are lost.
-const LOST: f64 = 0.05;
+/// Fewer rows say little of how a column runs: noise rises so often in a row with a probability below 1e-32.
+const FEWEST: usize = 30;
 /// Rates of inertial sensors, Hz, by which the unit is found; a count of samples has the rate 1 in every unit.
 const RATES: [f64; 2] = [2.0, 20_000.0];
 
@@ -36,19 +32,17 @@ pub(super) fn offer(mut error: InputError, table: &mut dyn Table) -> InputError 
     error
 }
 
-/// The unit of values that run like a clock.
+/// The unit of values that run like a clock: they rise from row to row, however unevenly (a log that is read in
+/// bursts has steps of a fifth and of thirty times the usual one).
 fn unit(values: &[f64]) -> Option<&'static str> {
-    if values.len() < FEWEST {
+    let (first, last) = (values.first()?, values.last()?);
+    if values.len() < FEWEST || !values.is_sorted_by(|a, b| a < b) {
         return None;
     }
-    let mut steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    steps.sort_by(f64::total_cmp);
-    let usual = steps[steps.len() / 2];
-    let large = steps.iter().filter(|step| **step > STEPS[1] * usual).count() as f64;
-    let runs = steps[0] > STEPS[0] * usual && steps.iter().all(|s| s.is_finite()) && large <= LOST * steps.len() as f64;
+    let usual = (last - first) / (values.len() - 1) as f64;
     let units = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)];
     let fits = |(_, second): &&(&str, f64)| (RATES[0]..=RATES[1]).contains(&(1.0 / (usual * second)));
-    if runs && usual > 0.0 && usual != 1.0 { units.iter().find(fits).map(|(unit, _)| *unit) } else { None }
+    if usual == 1.0 { None } else { units.iter().find(fits).map(|(unit, _)| *unit) }
 }
 
 #[cfg(test)]
@@ -68,7 +62,7 @@ mod tests {
         values.swap(40, 41);
         assert_eq!(unit(&values), None);
         let mut lost = at(0.01);
-        lost[50..].iter_mut().for_each(|t| *t += 3.0);
+        lost[50..].iter_mut().for_each(|t| *t += 0.3);
         assert_eq!(unit(&lost), Some("s"));
     }
 }

@@ -154,6 +154,8 @@ export const panel = {
     /** @type {any} */
     let document = null;
     let loaded = "";
+    /** What the answer is to that is seen, or will be. */
+    let asked = "";
     /** Factors on parameters, of every axis alike. @type {Map<string, number>} */
     let factors = new Map();
     /** @type {Aid[]} */
@@ -492,6 +494,7 @@ export const panel = {
       },
       (error) => {
         wait.hidden = true;
+        asked = "";
         // another tab asked
         if (/** @type {import("./api.js").ApiError} */ (error).status === 409) return;
         problem.hidden = false;
@@ -504,6 +507,9 @@ export const panel = {
       if (!params) return;
       const now = request();
       const sent = draft();
+      const all = JSON.stringify([now, sent, loaded]);
+      if (all === asked && !moving) return draw();
+      asked = moving ? "" : all;
       const quick = !!moving && shown.length > 1;
       if (quick) {
         sent.axes = [sent.axes[Math.min(Number(state.get("axis", "0")) || 0, sent.axes.length - 1)]];

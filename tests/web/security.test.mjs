@@ -296,10 +296,8 @@ test('no job reads outside of the folder', async () => {
       for (const [command, request] of requests) {
         const answer = await server.post('api/jobs', { command, request });
         const body = await answer.text();
-        assert.ok(
-          [400, 403, 404, 422].includes(answer.status),
-          `${command} ${JSON.stringify(name)}: ${answer.status} ${body}`,
-        );
+        const said = `${command} ${JSON.stringify(name)}: ${answer.status} ${body}`;
+        assert.ok([400, 403].includes(answer.status), said);
         assert.ok(!body.includes(SECRET), name);
       }
     }

@@ -94,7 +94,9 @@ export async function serve(place, ...options) {
     },
     async finished(id) {
       for (;;) {
-        const job = await (await this.get(`api/jobs/${id}`)).json();
+        const answer = await this.get(`api/jobs/${id}`);
+        const job = await answer.json();
+        if (answer.status !== 200) throw new Error(job.error);
         if (['done', 'failed', 'stopped'].includes(job.state)) return job;
         await new Promise((resolve) => setTimeout(resolve, 50));
       }

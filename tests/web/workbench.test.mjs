@@ -383,8 +383,7 @@ test('a log is dropped on the page', { skip }, async () => {
     return data;
   }, text.join('\n'));
   await page.dispatchEvent('body', 'drop', { dataTransfer: data });
-  await page.panel.locator('canvas').first().waitFor();
-  assert.match(await page.panel.innerText(), /3000 samples/);
+  await page.panel.getByText(/3000 samples/).waitFor();
   assert.equal(fs.readFileSync(path.join(server.folder, 'dropped.csv'), 'utf8'), text.join('\n'));
   // a second time it is there already
   page.wrong.length = 0;
@@ -517,7 +516,7 @@ test('when the server stops the page says so, and keeps what was set', { skip },
     .getByText(/does not answer/)
     .first()
     .waitFor();
-  assert.match(await page.evaluate(() => location.hash), /loop.kq=/);
+  await page.waitForFunction(() => /loop.kq=/.test(location.hash));
   await page.close();
   await own.stop();
 });

@@ -154,6 +154,8 @@ export const panel = {
     /** @type {any} */
     let document = null;
     let loaded = "";
+    /** What the answer is to that is seen, or will be. */
+    let asked = "";
     /** Factors on parameters, of every axis alike. @type {Map<string, number>} */
     let factors = new Map();
     /** @type {Aid[]} */
@@ -335,7 +337,7 @@ export const panel = {
           min: Math.min(LEAST * value, ...ends),
           max: Math.max(MOST * value, ...ends),
           onInput: (v) => move(it.id, v / value),
-          onChange: () => state.set({ x: words() }, true),
+          onChange: settle,
         });
       });
       const rates = aids.map((aid, i) => {
@@ -349,7 +351,7 @@ export const panel = {
           min: hz / RATE_REACH,
           max: hz * RATE_REACH,
           onInput: (v) => move(`aid${i}`, v / hz),
-          onChange: () => state.set({ x: words() }, true),
+          onChange: settle,
         });
       });
       fill(
@@ -377,6 +379,11 @@ export const panel = {
     function move(id, factor) {
       factors.set(id, factor);
       state.set({ x: words() });
+      ask(true);
+    }
+
+    function settle() {
+      state.set({ x: words() }, true);
       ask();
     }
 
@@ -469,19 +476,25 @@ export const panel = {
     }
 
     const preview = api.latest(
-      (/** @type {{request: any, draft: any, key: string, plain: boolean}} */ it) =>
+      (/** @type {{request: any, draft: any, key: string, plain: boolean, quick: boolean}} */ it) =>
         api.preview("tune", { ...it.request, runs: FEWEST_RUNS }, { drafts: { "params.json": it.draft } }),
       (made, it) => {
         wait.hidden = true;
         problem.hidden = true;
+        const now = results(made);
+        if (it.quick) {
+          shown = shown.map((old) => now.find(({ name }) => name === old.name) ?? old);
+          return draw();
+        }
         document = made;
-        shown = results(made);
+        shown = now;
         if (it.plain) base = { key: it.key, axes: shown };
         if (base && base.key !== it.key) base = null;
         draw();
       },
       (error) => {
         wait.hidden = true;
+        asked = "";
         // another tab asked
         if (/** @type {import("./api.js").ApiError} */ (error).status === 409) return;
         problem.hidden = false;
@@ -489,13 +502,23 @@ export const panel = {
       },
     );
 
-    function ask() {
+    /** @param {boolean} [moving] while a slider moves, the axis that is seen is enough */
+    function ask(moving) {
       if (!params) return;
       const now = request();
+      const sent = draft();
+      const all = JSON.stringify([now, sent, loaded]);
+      if (all === asked && !moving) return draw();
+      asked = moving ? "" : all;
+      const quick = !!moving && shown.length > 1;
+      if (quick) {
+        sent.axes = [sent.axes[Math.min(Number(state.get("axis", "0")) || 0, sent.axes.length - 1)]];
+        now.params = "draft:params.json";
+      }
       const key = JSON.stringify([loaded, now.plant.plant, aids, state.get("motion"), state.get("accelerometer")]);
       const plain = words() === "";
       wait.hidden = shown.length > 0;
-      preview({ request: now, draft: draft(), key, plain });
+      preview({ request: now, draft: sent, key, plain, quick });
       if (verified) {
         // what was verified is another design
         verified = null;

@@ -19,7 +19,7 @@ import {
   textField,
 } from "./ui.js";
 import { shownUnit } from "./panel_design.js";
-import { filesOf, heading, testTable } from "./panel_replay.js";
+import { failed, filesOf, heading, testTable } from "./panel_replay.js";
 import { figure } from "./plot.js";
 
 /** @typedef {ReturnType<typeof figure>} Figure */
@@ -131,7 +131,7 @@ export const panel = {
       try {
         await show(await api.run("montecarlo", asked, { onJob: progress }));
       } catch (error) {
-        job.fail(/** @type {Error} */ (error));
+        failed(job, error);
       }
       left.textContent = "";
       start.disabled = false;

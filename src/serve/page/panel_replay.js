@@ -55,6 +55,11 @@ export function filesOf(ctx, ...kinds) {
   return all.sort((a, b) => a.split("/").length - b.split("/").length);
 }
 
+/** What the job itself has not said. @param {{fail: (error: Error) => void}} job @param {any} error */
+export function failed(job, error) {
+  if (error.status !== 499) job.fail(error);
+}
+
 /** A verdict with what it means. @param {{verdict: string, meaning: string}} it */
 export const heading = ({ verdict, meaning }) => [
   el("h2", { className: verdict === "consistent" ? "good" : "bad" }, verdict),
@@ -206,7 +211,7 @@ export const panel = {
       try {
         await show(await api.run("replay", request(), { onJob: job.update }));
       } catch (error) {
-        job.fail(/** @type {Error} */ (error));
+        failed(job, error);
       }
       start.disabled = false;
     }
@@ -321,13 +326,16 @@ export const panel = {
         },
         { name: "estimate", x, y: estimate, colour: 1, width: 2 },
       ]);
-      const bounds = [BOUND, -BOUND].map((v) => ({
-        name: `${v > 0 ? "+" : "−"}${BOUND}`,
-        x: [x[0], x[x.length - 1]],
-        y: [v, v],
-        colour: 2,
-        dash: 1,
-      }));
+      /** @param {number[]} at @param {number} half @param {string} name @returns {import("./plot.js").Line} */
+      const between = (at, half, name) => {
+        const ends = [at[0], at[at.length - 1]];
+        const [low, high] = [
+          [-half, -half],
+          [half, half],
+        ];
+        return { name, x: ends, y: high, low, high, kind: "band", colour: 2 };
+      };
+      const bounds = between(x, BOUND, "within 3 sigma");
       inTime(`${axis.name}: innovations over their sigma`, "sigma", [
         {
           name: "least and greatest",
@@ -338,24 +346,16 @@ export const panel = {
           kind: "band",
           colour: 1,
         },
-        ...bounds,
+        bounds,
       ]);
       if (many) {
         inTime(
           `${axis.name}: means of ${axis.samples_per_point} innovations, times the root of ${axis.samples_per_point}`,
           "sigma",
-          [{ name: "averaged innovation", x, y: trace.innovation, colour: 1 }, ...bounds],
+          [{ name: "averaged innovation", x, y: trace.innovation, colour: 1 }, bounds],
         );
       }
       const lags = axis.autocorrelation.map((_, i) => i + 1);
-      const ends = [axis.autocorrelation_bound, -axis.autocorrelation_bound].map((v, i) => ({
-        name: i ? "" : "bound of one lag",
-        x: [lags[0], lags[lags.length - 1]],
-        y: [v, v],
-        colour: i ? undefined : 2,
-        dash: 1,
-        faint: i > 0,
-      }));
       if (lags.length) {
         add(
           figure({
@@ -364,7 +364,10 @@ export const panel = {
             y: "correlation",
             height: 220,
           }),
-          [{ name: "autocorrelation", x: lags, y: axis.autocorrelation, colour: 1 }, ...ends],
+          [
+            { name: "autocorrelation", x: lags, y: axis.autocorrelation, colour: 1 },
+            between(lags, axis.autocorrelation_bound, "bound of one lag"),
+          ],
         );
       }
       const spectrum = axis.cumulative_periodogram;

@@ -415,7 +415,7 @@ export function figure(keys) {
       ]);
       const ends = line.kind === "points" ? ["lower (95 %)", "upper (95 %)"] : ["least", "greatest"];
       const head = [keys.x, ...(line.kind === "band" ? [] : [keys.y]), ...(line.low && line.high ? ends : [])];
-      return table({ caption: line.name, head, rows: cells });
+      return table({ caption: `${keys.title}: ${line.name}`, head, rows: cells });
     });
     const csv = button("Download CSV", () => {
       const text = lines

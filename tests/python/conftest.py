@@ -20,10 +20,6 @@ COMMAND = shlex.split(os.environ.get("KFDESIGN", "")) or [sys.executable, "-m", 
 Cli = Callable[..., str]
 
 
-def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line("markers", "exhaustive: takes long, and a shorter test looks at the same; see .ci/python")
-
-
 @pytest.fixture(scope="session")
 def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a log at rest of three axes at 20 Hz, its parameters, and a filter."""

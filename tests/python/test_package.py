@@ -39,7 +39,7 @@ def test_mypy_strict(tmp_path: Path) -> None:
     pytest.importorskip("mypy")
     config = str(ROOT / "src/python/pyproject.toml")
     (tmp_path / "notebook.py").write_text("\n".join(notebook()), encoding="utf-8")
-    run("mypy", "--config-file", config, "--strict", str(PACKAGE), cwd=tmp_path)
+    run("mypy", "--config-file", config, "--strict", "--package", "kfdesign", cwd=tmp_path)
     # a notebook ends its cells with expressions, which is no matter of types
     run("mypy", "--config-file", config, "--strict", str(tmp_path / "notebook.py"), cwd=tmp_path)
 

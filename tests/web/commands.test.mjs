@@ -45,7 +45,7 @@ const asked = [
     { log: 'log.npy', deviation: 'mdev', taus: 'decade', reading: { columns: ['gyro_x'], start: '10', end: '1min' } },
   ],
   ['identify', { logs: ['log.npy'] }],
-  ['identify', { logs: ['log.npy'], method: 'graphical', model: 'white', hold: [], reading: { columns: ['gyro_y'] } }],
+  ['identify', { logs: ['log.npy'], method: 'graphical', hold: [], reading: { columns: ['gyro_y'] } }],
   ['identify', { logs: ['log.npy'], model: 'white+gm', hold: ['gauss_markov.correlation_time=200s'] }],
   ['plan', { params: 'params.json', parameter: 'gauss_markov.correlation_time', precision: '10%' }],
   ['compare', { params: 'params.json', log: 'log.npy', parameters: true }],
@@ -55,7 +55,7 @@ const asked = [
     'tune',
     { params: 'params.json', plant: { plant: 'angle', aid: ['heading: 2 deg @ 1 Hz'] }, insight: true, runs: 20 },
   ],
-  ['rank', { files: ['filter.json', 'params.json', 'log.npy'] }],
+  ['rank', { files: ['filter.json', 'params.json', 'log.npy'], held_out: 1 / 3, flicker_horizon: 10000 }],
   ['replay', { filter: 'filter.json', log: 'log.npy', alpha: 0.02, form: 'square-root' }],
   ['montecarlo', { filter: 'filter.json', runs: '20', duration: '60s' }],
   ['merge', { shards: ['a.json', 'b.json'] }],
@@ -77,8 +77,6 @@ for (const [command, request] of asked) {
     const printed = paste(`${job.shell} --json`);
     assert.ok([0, 1].includes(printed.status), printed.stderr);
     assert.equal(document, printed.stdout);
-    const brief = paste(job.shell);
-    assert.equal(job.brief?.trim(), brief.stdout.trim(), job.shell);
   });
 }
 

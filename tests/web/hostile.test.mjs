@@ -4,10 +4,12 @@ import fs from 'node:fs';
 import net from 'node:net';
 import path from 'node:path';
 import zlib from 'node:zlib';
-import { after, afterEach, before, test } from 'node:test';
+import { after, afterEach, before, test as plain } from 'node:test';
 
 import { files, folder, kfdesign, serve } from './support.mjs';
 
+/** One that hangs fails, and the next begins. */
+const test = (name, work) => plain(name, { timeout: 45_000 }, work);
 /** Bytes of an upload. */
 const LIMIT = 1 << 20;
 /** Of the server, MB: one log and a job, far from what any of these floods would take if it were held. */

@@ -118,7 +118,10 @@ function raw(port, text) {
       );
       resolve({ status: Number(status.split(' ')[1] ?? 0), headers, body: rest.join('\r\n\r\n') });
     };
-    socket.on('data', (chunk) => chunks.push(chunk));
+    // one that has answered may still wait for a body that never comes
+    socket.on('data', (chunk) => chunks.push(chunk) && setTimeout(() => socket.destroy(), 1000));
+    // longer than the server waits for headers; no answer is status 0
+    setTimeout(() => socket.destroy(), 15_000).unref();
     // a server that refuses may close before all was written
     socket.on('error', done).on('close', done);
   });

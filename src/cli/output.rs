@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{ErrorKind, IsTerminal, Write};
+use std::process::Stdio;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
@@ -151,6 +152,20 @@ fn painted(text: &str) -> String {
         line.replace(" FAIL", &format!(" {}", paint("FAIL", AnsiColor::Red)))
     };
     text.split('\n').map(line).collect::<Vec<_>>().join("\n")
+}
+
+/// An address in the browser, which is to print nothing here; where that fails, a person has the address.
+pub fn open(address: &str) {
+    let program = match std::env::consts::OS {
+        "macos" => "open",
+        "windows" => "explorer",
+        _ => "xdg-open",
+    };
+    let mut command = std::process::Command::new(program);
+    command.arg(address).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    if command.spawn().is_err() {
+        say("note: no browser was found; open the address in one");
+    }
 }
 
 /// A line on stderr. Who does not listen misses it.

@@ -1,11 +1,10 @@
 //! `kfdesign serve`.
 
 use std::path::PathBuf;
-use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use super::Status;
-use super::output::{print_text, say};
+use super::output::{open, print_text, say};
 use crate::ops::amounts::{whole, with_unit};
 use crate::serve::{Options, serve};
 use crate::units::Dimension;
@@ -63,18 +62,4 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Status> {
     serve(&options, ready).map_err(anyhow::Error::msg)?;
     say(&format!("nobody asked for {}: stopped", args.idle));
     Ok(Status::Done)
-}
-
-/// In the browser; where that fails, a person has the address.
-fn open(address: &str) {
-    let program = match std::env::consts::OS {
-        "macos" => "open",
-        "windows" => "explorer",
-        _ => "xdg-open",
-    };
-    let mut command = Command::new(program);
-    command.arg(address).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
-    if command.spawn().is_err() {
-        say("note: no browser was found; open the address in one");
-    }
 }

@@ -69,7 +69,7 @@ fn wrong_use_is_told_in_words() {
         ("plan params.json --parameter white.densty --precision 1%", "did you mean 'white.density'?"),
         ("identify log.csv --rate 1 --columns gyro_y", "did you mean 'gyro_x'?"),
     ] {
-        let out = bench.run(args);
+        let out = bench.as_typed(&args.split_whitespace().collect::<Vec<_>>());
         let told = out.stderr.lines().count() == 1 && out.stderr.contains(said);
         assert!(out.status == 2 && told && !out.stderr.contains("os error"), "{args}: {out:?}");
     }

@@ -40,7 +40,8 @@ export function folder(minutes = 0) {
 
 /** Starts the server on any port. */
 export async function serve(place, ...options) {
-  const words = ['serve', place, '--port', '0', '--no-open', ...options];
+  const anyPort = options.includes('--port') ? [] : ['--port', '0'];
+  const words = ['serve', place, '--no-open', ...anyPort, ...options];
   const child = spawn(BINARY, words, { stdio: ['ignore', 'pipe', 'pipe'] });
   let said = '';
   child.stderr.setEncoding('utf8').on('data', (text) => (said += text));
@@ -65,11 +66,12 @@ export async function serve(place, ...options) {
       await ended;
       fs.rmSync(place, { recursive: true, force: true });
     },
-    get: (route, headers = {}) => fetch(url + route, { headers }),
+    // a kept connection may be closed by the server while a test blocks
+    get: (route, headers = {}) => fetch(url + route, { headers: { Connection: 'close', ...headers } }),
     post: (route, body, headers = {}) =>
       fetch(url + route, {
         method: 'POST',
-        headers: { 'Content-Type': 'application/json', ...headers },
+        headers: { Connection: 'close', 'Content-Type': 'application/json', ...headers },
         body: typeof body === 'string' ? body : JSON.stringify(body),
       }),
     put: (route, body) => fetch(url + route, { method: 'PUT', body }),

@@ -4,6 +4,9 @@
 //! name that it rebinds to 127.0.0.1 read the answers. So the address holds a secret, and the headers that a browser
 //! writes and a page cannot must say that the request is the page's own.
 
+use std::time::Duration;
+
+use axum::body::{Body, HttpBody, to_bytes};
 use axum::extract::Request;
 use axum::http::header::{CONTENT_TYPE, HOST, HeaderMap, HeaderName, HeaderValue, ORIGIN};
 use axum::http::{Method, StatusCode};
@@ -14,6 +17,10 @@ use rand::rngs::SysRng;
 
 use super::Refused;
 
+/// Bytes of a request; a document of 64 axes has a hundred thousand.
+pub(super) const LARGEST_REQUEST: usize = 1 << 20;
+/// Until a body must be there: on loopback a mebibyte takes milliseconds.
+const BODY_TIME: Duration = Duration::from_secs(10);
 /// Of the secret: 192 bits cannot be guessed.
 const BYTES: usize = 24;
 
@@ -98,6 +105,18 @@ impl Guard {
         Ok(format!("/{rest}"))
     }
 
+    /// The request with its whole body: what is longer than it may be, or does not come, holds no connection.
+    async fn whole(request: Request) -> Result<Request, Refused> {
+        let (parts, body) = request.into_parts();
+        let too_large = || Refused::new(StatusCode::PAYLOAD_TOO_LARGE, "a request has 1 MiB at most");
+        if body.size_hint().lower() > LARGEST_REQUEST as u64 {
+            return Err(too_large());
+        }
+        let late = |_| Refused::new(StatusCode::REQUEST_TIMEOUT, "the request did not come to its end");
+        let body = tokio::time::timeout(BODY_TIME, to_bytes(body, LARGEST_REQUEST)).await.map_err(late)?;
+        Ok(Request::from_parts(parts, Body::from(body.map_err(|_| too_large())?)))
+    }
+
     /// The request without its token to who answers it; every answer with the headers that keep the page closed.
     pub(super) async fn pass(self, mut request: Request, next: Next) -> Response {
         let mut answer = match self.check(&request) {
@@ -106,7 +125,12 @@ impl Guard {
                 match format!("{path}{query}").parse() {
                     Ok(uri) => {
                         *request.uri_mut() = uri;
-                        next.run(request).await
+                        // of an upload the body is counted where it is written
+                        let upload = request.method() == Method::PUT;
+                        match if upload { Ok(request) } else { Self::whole(request).await } {
+                            Ok(request) => next.run(request).await,
+                            Err(refused) => refused.into_response(),
+                        }
                     }
                     Err(_) => Refused::new(StatusCode::NOT_FOUND, "not found").into_response(),
                 }

@@ -20,14 +20,13 @@ use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use tokio::task::spawn_blocking;
 
+use super::guard::LARGEST_REQUEST;
 use super::jobs::{Job, Jobs, Seen};
 use super::series::{self, Series};
 use super::{Options, Refused, curve, folder, page};
 use crate::cli::in_one_line;
 use crate::cli::named::without_place;
 
-/// Bytes of a request; a document of 64 axes has a hundred thousand.
-const LARGEST_REQUEST: usize = 1 << 20;
 /// Between two looks at a job that is followed: a person sees no more.
 const TICK: Duration = Duration::from_millis(100);
 /// After so many ticks without news the browser hears that the server is there.

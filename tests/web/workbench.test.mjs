@@ -411,7 +411,8 @@ test('what is saved is accepted by the command line', { skip }, async () => {
   const tuned = kfdesign(server.folder, 'tune', 'found.json', '-o', 'found-filter.json');
   assert.equal(tuned.status, 0, tuned.stderr);
   const replayed = kfdesign(server.folder, 'replay', 'found-filter.json', 'log.npy', '--allow-inconclusive');
-  assert.equal(replayed.status, 0, replayed.stderr);
+  // ten minutes tell no drift, so the verdict may be against it; 2 would be a file that is not accepted
+  assert.ok([0, 1].includes(replayed.status), replayed.stderr);
   // it does not replace what is there unless it is told to
   await save.getByRole('button', { name: 'Save', exact: true }).click();
   await save.getByText(/there already/).waitFor();

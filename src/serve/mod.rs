@@ -1,7 +1,7 @@
 //! The workbench in the browser (floor 9): a server for one person on one machine.
 //!
 //! It runs the commands of the command line and hands out what they make; every number on the page is the library's.
-//! [`guard`] says who may ask, [`folder`] which files there are, [`jobs`] does the work, [`routes`] answers.
+//! `guard` says who may ask, `folder` which files there are, `jobs` does the work, `routes` answers.
 
 mod curve;
 mod folder;

@@ -587,7 +587,8 @@ fn words_from_a_log_cannot_become_markup() {
                 .findings("warning", vec![evil.into()])
                 .list(vec![evil.into()])
                 .command(evil, evil)
-                .table(evil, &[evil, evil], [[evil, evil]])
+                // a caption that is the heading again is not shown
+                .table(format!("{evil}."), &[evil, evil], [[evil, evil]])
                 .figure(evil, move || drawn.clone()),
         ],
         ..Report::default()

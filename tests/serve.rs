@@ -1,5 +1,5 @@
-//! The workbench in the browser: requests and command lines are the same thing; who may ask, and for which files. What a
-//! browser does with it is tested in `tests/web`.
+//! The workbench in the browser: requests and command lines are the same thing; who may ask, and for which files. What
+//! a browser does with it is tested in `tests/web`.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -76,7 +76,7 @@ fn a_request_and_its_command_line_give_the_same_document() {
     bench.file("params.json", std::fs::read(data("params.json")).unwrap());
     let at = |name: &str| bench.path(name).display().to_string();
     let same = |command: &str, request: Value| {
-        let made = named::make(command, &request.to_string()).unwrap();
+        let made = named::make(command, &request.to_string(), true).unwrap();
         let words = shell::words(command, &request).unwrap();
         let typed: Vec<&str> = words.iter().map(String::as_str).chain(["--json"]).collect();
         assert_eq!(bench.as_typed(&typed).stdout, made.json, "{}", shell::line(&words));
@@ -175,6 +175,39 @@ fn only_its_own_page_may_ask() {
     assert_eq!(post(""), 415);
     assert_eq!(post("Content-Type: application/json\r\n"), 400);
     assert_eq!(server.raw("OPTIONS", &page, "", "").0, 405);
+    // refused by what it says of itself: that body never comes
+    let headers = "Content-Type: application/json\r\nContent-Length: 2147483648\r\n";
+    assert_eq!(server.raw("POST", &format!("/{token}/api/jobs"), headers, "").0, 413);
+}
+
+/// One job at a time: the second waits with its draft, and both are stopped.
+#[test]
+fn a_stopped_job_leaves_nothing() {
+    let bench = Bench::new();
+    let params = std::fs::read(data("params.json")).unwrap();
+    bench.file("params.json", &params);
+    let server = Server::start(bench.path("").as_path(), &[]);
+    let tune = |params: &str| json!({ "command": "tune", "request": { "params": params, "runs": 1_000_000_000 } });
+    let mut waiting = tune("draft:p");
+    waiting["drafts"] = json!({ "p": serde_json::from_slice::<Value>(&params).unwrap() });
+    for job in [tune("params.json"), waiting] {
+        assert_eq!(server.post("api/jobs", &job).0, 202);
+    }
+    assert_eq!(bench.files().len(), 2, "{:?}", bench.files());
+    for id in [2, 1] {
+        assert_eq!(server.raw("DELETE", &format!("/{}/api/jobs/{id}", server.token), "", "").0, 200);
+    }
+    assert_eq!(bench.files(), ["params.json"]);
+    let ended = || server.get("api/jobs/1").1.contains("\"state\":\"stopped\"");
+    while !ended() {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    // the next one begins
+    let info = json!({ "command": "plan", "request": { "params": "params.json", "parameter": "white.density", "precision": "1%" } });
+    assert_eq!(server.post("api/jobs", &info).0, 202);
+    while !server.get("api/jobs/3").1.contains("\"state\":\"done\"") {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
 }
 
 #[test]

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::squares::folded;
 use super::{Deviation, deviation, lag_sum};
 use crate::noise::{NoiseModel, Term};
+use crate::numerics::progress::checkpoint;
 
 /// Covariance matrix of the overlapping Allan *variance* estimates at several averaging factors, from `samples` rate
 /// samples of period `dt` (s), for a Gaussian mixture: with c the cross-covariance of the second differences and μ
@@ -66,7 +67,9 @@ impl Form {
     fn work_out(&self) {
         // no thread waits for another: one that waited with a claim of its own further down its stack would wait for
         // ever
-        self.pairs.par_iter().for_each(|pair| {
+        self.pairs.par_iter().panic_fuse().for_each(|pair| {
+            // before the claim, which must be filled
+            checkpoint();
             if !pair.taken.swap(true, Ordering::Relaxed) {
                 // filled already only by the same numbers
                 let _ = pair.parts.set(self.parts(pair.points));

@@ -82,8 +82,9 @@ impl VerdictFlags {
     name = "kfdesign",
     version,
     about,
-    after_help = "Begin with: kfdesign identify LOG -o params.json, kfdesign tune params.json -o filter.json,\n            \
-                  kfdesign replay filter.json LOG; each says which command comes next\nExit status: 0 done and consistent; 1 done, but a stated check failed, or the verdict is \
+    after_help = "Begin with: kfdesign identify LOG -o params.json, kfdesign tune params.json -o filter.json,\n\
+                  \u{20}           kfdesign replay filter.json LOG; each says which command comes next\n\
+                  Exit status: 0 done and consistent; 1 done, but a stated check failed, or the verdict is \
                   inconclusive (see --allow-inconclusive); 2 could not do it. It is that of the work, whatever becomes \
                   of its output.\nUnits are never guessed: the log's header or --unit says them."
 )]

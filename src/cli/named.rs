@@ -1,5 +1,5 @@
-//! Commands by name: a request as JSON becomes a document, and what else comes of it. One row per command; Python and the
-//! workbench in the browser know of no other.
+//! Commands by name: a request as JSON becomes a document, and what else comes of it. One row per command; Python and
+//! the workbench in the browser know of no other.
 
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
@@ -45,8 +45,8 @@ impl std::fmt::Debug for Made {
 }
 
 impl Made {
-    /// Texts by name: `brief` and `full` as on a terminal, `page` of HTML, `figures` as SVG, `junit`, `verdict` in a word, `curves` as JSON;
-    /// `None` where there is none. It may take long: figures of runs are simulated.
+    /// Texts by name: `brief` and `full` as on a terminal, `page` of HTML, `figures` as SVG, `junit`, `verdict` in a
+    /// word, `curves` as JSON; `None` where there is none. It may take long: figures of runs are simulated.
     pub fn shown(&self, name: &str) -> anyhow::Result<Option<String>> {
         (self.shown)(name)
     }
@@ -147,8 +147,9 @@ fn imported(found: Imported) -> anyhow::Result<Made> {
     Ok(Made { file, files, ..row!(found; d => d.sensors.first(); view::import::import(d); None) })
 }
 
+/// `figures`: also work out what only they show. Errors: the request is none, or its work has failed; one line.
 #[rustfmt::skip] // a table: one row, one command
-pub fn make(name: &str, request: &str) -> anyhow::Result<Made> {
+pub fn make(name: &str, request: &str, figures: bool) -> anyhow::Result<Made> {
     Ok(match name {
         "params" => document(Params::read(&asked::<PathBuf>(request)?)?.to_json()),
         "design" => document(FilterDesign::read(&asked::<PathBuf>(request)?)?.to_json()),
@@ -169,9 +170,9 @@ pub fn make(name: &str, request: &str) -> anyhow::Result<Made> {
         "simulate" => row!(simulate::run(&asked(request)?)?; d => d; view::simulate::simulate(d); None),
         "trim" => row!(trim::run(&asked(request)?)?; d => d.document;
             view::trim::trim(&d.linearized, &d.document); None),
-        "fly" => row!(fly::run(&asked(request)?, true)?; d => d.report; view::fly::fly(&d.report, &d.header,
+        "fly" => row!(fly::run(&asked(request)?, figures)?; d => d.report; view::fly::fly(&d.report, &d.header,
             d.lines.as_ref(), &d.stops); Some(format!("Flight of {}", d.report.airplane))),
-        "loop" => row!(closed_loop::run(&asked(request)?, true)?; d => d.judged.document;
+        "loop" => row!(closed_loop::run(&asked(request)?, figures)?; d => d.judged.document;
             view::closed_loop::closed_loop(&d.judged, &d.drawn);
             Extra { title: Some(format!("Control loop of {}", d.judged.document.airplane)),
                 curves: Some(Box::new(|| view::closed_loop::curves(&d.judged))) }),

@@ -5,8 +5,8 @@ use serde_json::Value;
 
 use super::Cli;
 
-/// The words after `kfdesign`, from a request of the command of this name: its keys are flags and arguments. Errors: the
-/// command or a key is not known.
+/// The words after `kfdesign`, from a request of the command of this name: its keys are flags and arguments. Errors:
+/// the command or a key is not known.
 pub fn words(name: &str, request: &Value) -> Result<Vec<String>, String> {
     let (command, hidden) = if name == "rank" { ("tune", Some(("files", "rank"))) } else { (name, None) };
     let mut all = Cli::command();

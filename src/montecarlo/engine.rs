@@ -45,6 +45,8 @@ impl Course {
         let zero = || self.axes.iter().map(|axis| Totals::new(&axis.layout)).collect::<Vec<_>>();
         (0..groups * self.axes.len() as u64)
             .into_par_iter()
+            // a stop is a panic, after which each of the many groups would begin before it hears of it
+            .panic_fuse()
             .fold(
                 || (zero(), self.axes.iter().map(|_| None).collect::<Vec<Option<Scratch>>>()),
                 |(mut totals, mut scratch), item| {

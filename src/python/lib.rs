@@ -34,7 +34,7 @@ fn run(
     listener: Option<Py<PyAny>>,
     threads: Option<usize>,
 ) -> PyResult<Outcome> {
-    let (made, notes) = call(py, &logs, listener, threads, || make(name, request))?;
+    let (made, notes) = call(py, &logs, listener, threads, || make(name, request, true))?;
     Ok(Outcome { made, notes })
 }
 

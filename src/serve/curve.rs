@@ -43,8 +43,8 @@ struct OfTerm {
     density: Vec<f64>,
 }
 
-/// The Allan deviation σ(τ) and the square root of the two-sided spectral density (white noise: N). Errors: parameters that params.json could
-/// not have.
+/// The Allan deviation σ(τ) and the square root of the two-sided spectral density (of white noise: N). Errors:
+/// parameters that params.json could not have.
 pub(super) fn curve(asked: &Asked) -> Result<Curve, Refused> {
     let params = Params::from_json(&asked.params.to_string(), "params");
     let params = params.map_err(|error| Refused::unprocessable(error.to_string()))?;

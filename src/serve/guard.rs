@@ -19,8 +19,8 @@ use super::Refused;
 
 /// Bytes of a request; a document of 64 axes has a hundred thousand.
 pub(super) const LARGEST_REQUEST: usize = 1 << 20;
-/// Until a body must be there: on loopback a mebibyte takes milliseconds.
-const BODY_TIME: Duration = Duration::from_secs(10);
+/// Until a body, or the next part of an upload, must be there: on loopback a mebibyte takes milliseconds.
+pub(super) const BODY_TIME: Duration = Duration::from_secs(10);
 /// Of the secret: 192 bits cannot be guessed.
 const BYTES: usize = 24;
 

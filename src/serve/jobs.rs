@@ -20,6 +20,8 @@ use crate::units::plain;
 pub(super) const MOST_WAITING: usize = 16;
 /// Finished jobs whose results are kept.
 const MOST_KEPT: usize = 32;
+/// The number of what is in no queue.
+const PREVIEW: u64 = 0;
 /// Notes of a job: a damaged log has one for each line.
 const MOST_NOTES: usize = 100;
 
@@ -165,6 +167,8 @@ impl Job {
         self.change(|seen| {
             if seen.state == State::Waiting {
                 seen.state = State::Stopped;
+                // its drafts go with it
+                locked(&self.asked).take();
             }
         });
     }
@@ -179,7 +183,12 @@ impl Job {
         let request = asked.given.to_string();
         let watch: Arc<dyn Progress> = Arc::clone(self) as _;
         let work = || {
-            let made = make(&asked.command, &request)?;
+            // of a preview the document alone is looked at
+            let whole = self.id != PREVIEW;
+            let made = make(&asked.command, &request, whole)?;
+            if !whole {
+                return Ok((made, None, None));
+            }
             // what is said of it is small, and drawn while who asked still waits
             let said = made.shown("brief").and_then(|brief| Ok((brief, made.shown("verdict")?)));
             said.map(|(brief, verdict)| (made, brief, verdict))
@@ -300,7 +309,7 @@ impl Jobs {
 
     /// Work outside the queue, in the place of what was asked for before: that is stopped.
     pub(super) fn replace_preview(&self, asked: Prepared) -> Arc<Job> {
-        let job = Arc::new(Job::new(0, asked));
+        let job = Arc::new(Job::new(PREVIEW, asked));
         if let Some(old) = locked(&self.preview).replace(Arc::clone(&job)) {
             old.stop();
         }

@@ -19,8 +19,9 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use tokio::task::spawn_blocking;
+use tokio::time::timeout;
 
-use super::guard::LARGEST_REQUEST;
+use super::guard::{BODY_TIME, LARGEST_REQUEST};
 use super::jobs::{Job, Jobs, Seen};
 use super::series::{self, Series};
 use super::{Options, Refused, curve, folder, page};
@@ -33,8 +34,8 @@ const TICK: Duration = Duration::from_millis(100);
 const TICKS_OF_SILENCE: u32 = 150;
 
 /// A report has its style with it; it may do nothing else, and is no part of the workbench.
-const OF_REPORTS: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'; \
-                          frame-ancestors 'self'; sandbox";
+const OF_REPORTS: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; \
+                          form-action 'none'; frame-ancestors 'self'; sandbox";
 
 /// What routes know.
 #[derive(Debug)]
@@ -295,9 +296,9 @@ async fn upload(With(bench): Bench, Path(name): Path<String>, request: Asked) ->
     let mut file = folder::upload(&name)?;
     let mut body = request.into_body().into_data_stream();
     let mut written = 0;
-    while let Some(chunk) = body.next().await {
-        let broken = |_| Refused::new(StatusCode::BAD_REQUEST, "the upload broke off");
-        let chunk = chunk.map_err(broken)?;
+    let broken = || Refused::new(StatusCode::BAD_REQUEST, "the upload broke off");
+    while let Some(chunk) = timeout(BODY_TIME, body.next()).await.map_err(|_| broken())? {
+        let chunk = chunk.map_err(|_| broken())?;
         written += chunk.len() as u64;
         if written > most {
             return Err(too_large());

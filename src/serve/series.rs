@@ -105,8 +105,8 @@ impl Held {
         }
     }
 
-    /// Time from the start, least and greatest value of every pixel that has samples, in the log's unit, as little-endian
-    /// doubles.
+    /// Time from the start, least and greatest value of every pixel that has samples, in the log's unit, as
+    /// little-endian doubles.
     pub(super) fn pixels(&self, asked: &Asked) -> Result<Vec<u8>, Refused> {
         let log = &self.recording;
         let number = asked.axis.unwrap_or(0);

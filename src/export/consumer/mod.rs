@@ -220,7 +220,7 @@ fn clamped(name: &str, value: f64, low: f64, high: f64, warnings: &mut Vec<Strin
 }
 
 /// How the parameters of the second sensor come here.
-const ACCELEROMETER: &str = "`accelerometer` PARAMS, which identify makes of a log with `sensor` accelerometer";
+const ACCELEROMETER: &str = "`accelerometer` PARAMS, which identify makes of a log with `sensor` accel";
 
 /// What is said of a sensor that is not there.
 fn lacking(quantity: Quantity) -> String {

@@ -529,15 +529,19 @@ export const panel = {
       (it) => {
         const points = result.axes[at()]?.allan;
         if (!points) return;
-        const thin = it.terms.map((term, i) => ({
-          name: TERMS[term.name] ?? term.name,
-          x: it.times,
-          y: term.deviation,
-          colour: 2 + (i % 5),
-          dash: 1 + (i % 5),
-          width: 1,
-          faint: true,
-        }));
+        /** The model and its terms, thin. @param {number[]} x @param {"deviation" | "density"} key */
+        const lines = (x, key) => [
+          { name: "model", x, y: it[key], colour: 1, width: 2 },
+          ...it.terms.map((term, i) => ({
+            name: TERMS[term.name] ?? term.name,
+            x,
+            y: term[key],
+            colour: 2 + (i % 5),
+            dash: 1 + (i % 5),
+            width: 1,
+            faint: true,
+          })),
+        ];
         plot.set([
           {
             name: "log, 95 % bars",
@@ -547,19 +551,9 @@ export const panel = {
             high: points.upper,
             kind: "points",
           },
-          { name: "model", x: it.times, y: it.deviation, colour: 1, width: 2 },
-          ...thin,
+          ...lines(it.times, "deviation"),
         ]);
-        const under = it.terms.map((term, i) => ({
-          name: TERMS[term.name] ?? term.name,
-          x: it.frequencies,
-          y: term.density,
-          colour: 2 + (i % 5),
-          dash: 1 + (i % 5),
-          width: 1,
-          faint: true,
-        }));
-        spectrum.set([{ name: "model", x: it.frequencies, y: it.density, colour: 1, width: 2 }, ...under]);
+        spectrum.set(lines(it.frequencies, "density"));
         handles(it, points);
       },
       (error) => job.fail(error),

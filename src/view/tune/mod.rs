@@ -93,7 +93,7 @@ pub fn tune<'a>(of: &Design<'a>) -> Report<'a> {
     let (params, outcome) = (of.params, of.verification);
     let groups = groups(of);
     let mut sections: Vec<Section<'a>> = of.record.iter().map(|record| objective::section(record, params)).collect();
-    let rate = digits(params.sample_rate_hz);
+    let rate = short(params.sample_rate_hz);
     let headline = format!("{}: plant {}, {rate} Hz, {}", of.name, of.tuned.design.plant, measured(of));
     sections.push(Section::new("").paragraph(headline));
     sections.extend(groups.iter().map(group_section));
@@ -108,7 +108,7 @@ pub fn tune<'a>(of: &Design<'a>) -> Report<'a> {
     let lines = [
         ("parameters", of.name.to_string()),
         ("plant", of.tuned.design.plant.clone()),
-        ("sample rate", format!("{} Hz", digits(params.sample_rate_hz))),
+        ("sample rate", format!("{rate} Hz")),
         ("seed", outcome.seed.to_string()),
     ];
     Report {
@@ -300,12 +300,17 @@ fn verification<'a>(of: &Design<'a>) -> Section<'a> {
         .table(montecarlo::tests_caption(outcome), &montecarlo::TESTS, outcome.tests.iter().map(montecarlo::test_row))
 }
 
+/// A rate or a length as it was given: at most seven digits, and no zeros that were made up.
+fn short(x: f64) -> f32 {
+    x as f32
+}
+
 /// What was run and what it means.
 fn verification_sentence(outcome: &Outcome, sample_rate_hz: f64) -> String {
     let what = format!(
         "{} runs of {} s on the design's own model (seed {}), {} tests, false alarm {} %",
         outcome.runs.count(),
-        digits(outcome.steps as f64 / sample_rate_hz),
+        short(outcome.steps as f64 / sample_rate_hz),
         outcome.seed,
         outcome.tests.len(),
         100.0 * outcome.alpha

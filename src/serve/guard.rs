@@ -109,12 +109,15 @@ impl Guard {
     async fn whole(request: Request) -> Result<Request, Refused> {
         let (parts, body) = request.into_parts();
         let too_large = || Refused::new(StatusCode::PAYLOAD_TOO_LARGE, "a request has 1 MiB at most");
-        if body.size_hint().lower() > LARGEST_REQUEST as u64 {
+        // a little too much is read to its end, or the client would not hear the answer
+        let most = 2 * LARGEST_REQUEST;
+        if body.size_hint().lower() > most as u64 {
             return Err(too_large());
         }
         let late = |_| Refused::new(StatusCode::REQUEST_TIMEOUT, "the request did not come to its end");
-        let body = tokio::time::timeout(BODY_TIME, to_bytes(body, LARGEST_REQUEST)).await.map_err(late)?;
-        Ok(Request::from_parts(parts, Body::from(body.map_err(|_| too_large())?)))
+        let body = tokio::time::timeout(BODY_TIME, to_bytes(body, most)).await.map_err(late)?;
+        let body = body.ok().filter(|body| body.len() <= LARGEST_REQUEST).ok_or_else(too_large)?;
+        Ok(Request::from_parts(parts, Body::from(body)))
     }
 
     /// The request without its token to who answers it; every answer with the headers that keep the page closed.

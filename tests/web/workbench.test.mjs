@@ -482,7 +482,7 @@ test('hostile names are text', { skip }, async () => {
 
 test('a log whose unit is not known asks for it', { skip }, async () => {
   const rows = Array.from({ length: 2000 }, (_, i) => `${i / 100},${Math.sin(i * i)}`);
-  fs.writeFileSync(path.join(server.folder, 'unitless.csv'), ['time,gyro_x', ...rows].join('\n'));
+  fs.writeFileSync(path.join(server.folder, 'unitless.csv'), ['time (s),gyro_x', ...rows].join('\n'));
   const page = await open({ panel: 'log', log: 'unitless.csv' });
   await page.panel.getByRole('alert').getByText(/unit/).waitFor();
   await page.getByLabel('Unit of the values').fill('deg/s');

@@ -10,6 +10,7 @@ pub use super::covariance::covariance;
 use super::{Deviation, NoiseType, deviation, lag_sum};
 use crate::noise::{NoiseModel, Term};
 use crate::numerics::distribution::chi_square_quantile;
+use crate::numerics::progress::checkpoint;
 
 /// Degrees of freedom of the estimate at averaging factor `m` from `samples` rate samples of period `dt` (s) for this
 /// noise mixture. Exact; for TOTDEV by the power law that dominates at this averaging time.
@@ -111,6 +112,8 @@ fn mean_second_difference(model: &NoiseModel, m: u64, dt: f64) -> f64 {
 
 /// `edf` of the mean of `terms` squares of a stationary Gaussian series with this mean and autocovariance.
 fn satterthwaite(terms: u64, mean: f64, kinks: &[i64], autocovariance: impl Fn(i64) -> f64) -> f64 {
+    // the sum over the lags of one averaging time takes milliseconds
+    checkpoint();
     let count = terms as f64;
     let variance = autocovariance(0);
     let square = mean * mean;

@@ -14,6 +14,8 @@ use rayon::prelude::*;
 use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftDirection, FftPlanner};
 
+use crate::numerics::progress::checkpoint;
+
 /// Columns that are transformed together: two cache lines of every row.
 const TILE: usize = 8;
 /// The smaller factor at least.
@@ -129,6 +131,7 @@ impl FourSteps {
         tiles.resize(a * b, ZERO);
         let memory = || (vec![ZERO; a * TILE], vec![ZERO; of_columns.get_inplace_scratch_len()]);
         tiles.par_chunks_mut(a * TILE).enumerate().for_each_init(memory, |(columns, scratch), (tile, out)| {
+            checkpoint();
             let (width, first) = (out.len() / a, tile * TILE);
             for j in 0..a {
                 (0..width).for_each(|t| columns[t * a + j] = x(b * j + first + t));
@@ -142,6 +145,7 @@ impl FourSteps {
         let mut rows = vec![ZERO; a * b];
         let memory = || vec![ZERO; of_rows.get_inplace_scratch_len()];
         rows.par_chunks_mut(b).enumerate().for_each_init(memory, |scratch, (k, row)| {
+            checkpoint();
             for (tile, part) in tiles.chunks(a * TILE).zip(row.chunks_mut(TILE)) {
                 let from = &tile[k * part.len()..];
                 part.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
@@ -157,11 +161,13 @@ impl FourSteps {
         let [of_columns, of_rows] = self.plans(FftDirection::Inverse);
         let memory = || vec![ZERO; of_rows.get_inplace_scratch_len()];
         rows.par_chunks_mut(b).enumerate().for_each_init(memory, |scratch, (k, row)| {
+            checkpoint();
             of_rows.process_with_scratch(row, scratch);
             self.roots.turn(row, k, true);
         });
         let memory = || vec![ZERO; of_columns.get_inplace_scratch_len()];
         columns.par_chunks_mut(a * TILE).enumerate().for_each_init(memory, |scratch, (tile, out)| {
+            checkpoint();
             let width = out.len() / a;
             for k in 0..a {
                 let from = &rows[k * b + tile * TILE..][..width];
